@@ -119,6 +119,23 @@ def coarse_pictures():
         yield
 
 
+@pytest.fixture(scope="session")
+def calls(tmp_path_factory):
+    """A right call of every public name; not to be changed."""
+    from helpers.public_calls import right_calls
+
+    return right_calls(tmp_path_factory.mktemp("calls"))
+
+
+@pytest.fixture
+def before_sampling(monkeypatch, tmp_path):
+    """Calls that would sample end where they would begin to; files are written to a folder of the test's own."""
+    from helpers.public_calls import end_before_sampling
+
+    end_before_sampling(monkeypatch)
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture
 def settings_left_alone():
     """Matplotlib's settings are the same after a test, and its figures are closed."""

@@ -11,66 +11,59 @@ from tactile_bayes.record import present_channels, write_record
 from tactile_bayes.rig import Rig, read_record
 from tactile_bayes.sweep import scan
 
-NAMES = ["sweep", "direction", "base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y"]
-
 
 @pytest.fixture(scope="module")
-def table(measured, tmp_path_factory):
-    """Header and rows of a good file, rows as lists of cells."""
+def good(measured, tmp_path_factory):
+    """Header of a good file, and its columns by name, as lists of cells."""
     path = tmp_path_factory.mktemp("good") / "record.csv"
     write_record(measured, path)
     lines = path.read_text(encoding="utf-8").splitlines()
     header = [line for line in lines if line.startswith("#") and "column" not in line]
-    return header, [line.split(",") for line in lines if not line.startswith("#")][1:]
+    names, *rows = [line.split(",") for line in lines if not line.startswith("#")]
+    return header, dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
 
-def written(path, header, names, rows):
-    path.write_text("\n".join([*header, ",".join(names), *map(",".join, rows)]) + "\n", encoding="utf-8")
+def written(folder, header, columns):
+    path = folder / "record.csv"
+    rows = zip(*columns.values(), strict=True)
+    path.write_text("\n".join([*header, ",".join(columns), *map(",".join, rows)]) + "\n", encoding="utf-8")
     return path
 
 
-def edited(rows, row, column, text):
-    rows = [list(cells) for cells in rows]
-    rows[row][NAMES.index(column)] = text
-    return rows
+def without_force_y(columns):
+    return {name: cells for name, cells in columns.items() if name != "force_y"}
 
 
-def mapped(rows, column, change):
-    place = NAMES.index(column)
-    return [[*cells[:place], change(cells[place]), *cells[place + 1 :]] for cells in rows]
-
-
-def without_last(rows):
-    return [cells[:-1] for cells in rows]
+def with_empty_force_y(columns):
+    return columns | {"force_y": [""] * len(columns["force_y"])}
 
 
 FIRST_ROW = 9  # the line of the first sample: seven of header and the names come before it
 MISTAKES = {
     "a missing column": (
-        lambda rows: (NAMES[:-1], without_last(rows)),
+        without_force_y,
         ["column 'force_y'", "Rig(file={'force_y': 'NAME[UNIT]'})", 'force_y = "NAME[UNIT]"', 'missing = ["force_y"]'],
     ),
     "a misspelt column": (
-        lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
+        lambda columns: {name.replace("drive_angle", "drive_angel"): cells for name, cells in columns.items()},
         ["column 'drive_angel'", "Rig(file={'drive_angle': 'drive_angel'})", 'drive_angle = "drive_angel"'],
     ),
     "text in a row": (
-        lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),
+        lambda columns: columns | {"force_x": [*columns["force_x"][:3], "overload", *columns["force_x"][4:]]},
         [f"line {FIRST_ROW + 3}, column 'force_x'", "'overload'"],
     ),
     "two segments in one sweep": (
-        lambda rows: (NAMES, mapped(rows, "sweep", lambda cell: "0")),
+        lambda columns: columns | {"sweep": ["0"] * len(columns["sweep"])},
         ["sweep 0", "'direction'", f"'forward' (line {FIRST_ROW})", "'backward' (line"],
     ),
 }
 
 
 @pytest.mark.parametrize(("mistake", "named"), MISTAKES.values(), ids=MISTAKES)
-def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, named):
+def test_a_mistake_in_a_file_is_named_with_its_place(good, tmp_path, mistake, named):
     """By the library as an error, by the command as a line on stderr and exit code 2: the same words."""
-    header, rows = table
-    names, rows = mistake(rows)
-    path = written(tmp_path / "record.csv", header, names, rows)
+    header, columns = good
+    path = written(tmp_path, header, mistake(columns))
     with refused(RecordError, *named) as caught:
         read_record(path)
     assert str(caught.value).startswith(f"{path}: ")
@@ -82,15 +75,10 @@ def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, n
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick")
-@pytest.mark.parametrize("way", ["an empty column", "no column"])
-def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
-    header, rows = table
-    if way == "no column":
-        path = written(tmp_path / "record.csv", header, NAMES[:-1], without_last(rows))
-        missing = ["force_y"]
-    else:
-        path = written(tmp_path / "record.csv", header, NAMES, mapped(rows, "force_y", lambda cell: ""))
-        missing = []
+@pytest.mark.parametrize(("change", "missing"), [(with_empty_force_y, []), (without_force_y, ["force_y"])])
+def test_a_channel_wholly_missing_is_allowed(good, tmp_path, change, missing):
+    header, columns = good
+    path = written(tmp_path, header, change(columns))
     assert present_channels(read_record(path, Rig(file={"missing": missing}))) == ("holding_moment", "force_x")
     (tmp_path / "rig.toml").write_text(f'unknown = "nothing"\n[file]\nmissing = {missing}\n')
     result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--rig", tmp_path / "rig.toml")
@@ -98,15 +86,17 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
     assert "No contact points" in result.stdout
 
 
-# --- Contours -----------------------------------------------------------------------------------------------------
+RUBBED = Rig(unknown={"friction": 0.3})
 
 
-@pytest.mark.parametrize("direction", ["forward", "backward"])
-def test_a_contour_that_is_hardly_touched_is_refused(direction):
-    with refused(ReachError, "rounding"):
-        scan(Ellipse(0.25, 8e5, 1.0 - 2e-11), direction=direction, rig=Rig(unknown={"friction": 0.3}))
-
-
-def test_a_contour_at_the_end_of_reach_but_for_rounding_is_out_of_it():
-    with refused(ReachError, "out of reach"):
-        scan(Parabola(2.0, np.nextafter(1.0, 0.0)))
+@pytest.mark.parametrize(
+    ("contour", "options", "named"),
+    [
+        (Ellipse(0.25, 8e5, 1.0 - 2e-11), {"direction": "forward", "rig": RUBBED}, "rounding"),
+        (Ellipse(0.25, 8e5, 1.0 - 2e-11), {"direction": "backward", "rig": RUBBED}, "rounding"),
+        (Parabola(2.0, np.nextafter(1.0, 0.0)), {}, "out of reach"),
+    ],
+)
+def test_a_contour_that_is_hardly_touched_is_refused(contour, options, named):
+    with refused(ReachError, named):
+        scan(contour, **options)

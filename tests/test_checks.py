@@ -1,6 +1,5 @@
 """Wrong arguments of the names that are used first: each is refused, in words, before anything is computed."""
 
-import contextlib
 import functools
 import inspect
 import math
@@ -14,10 +13,8 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
-from helpers.public_calls import AcceptedError, end_before_sampling
-from helpers.public_names import public
-from helpers.refusals import refused
-from helpers.wrong_values import WRONG
+from helpers.public_calls import AcceptedError, ideal, posterior
+from helpers.wrong_values import CELL, WRONG
 from tactile_bayes.checks import (
     as_number,
     as_numbers,
@@ -39,58 +36,13 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
 
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-
-
-@functools.cache
-def ideal():
-    return tb.scan(tb.contours.Parabola(0.5, 0.5), drive_step=0.1).record
-
-
-@functools.cache
-def measured():
-    return CELL.measure(ideal(), rng=1)
-
-
-@functools.cache
-def posterior():
-    """A tree as `infer_contour` returns it, of a few draws."""
-    draws = {"a": 0.5, "q": 0.3, "x_c": 0.0}
-    ends = {"first_contact_x": [0.9, -0.9], "snap_off_contact_x": [0.2, -0.1], "snap_off_drive_angle": [3.2, -0.1]}
-    groups = {
-        "posterior": xr.Dataset({k: (("chain", "draw"), np.full((2, 3), v)) for k, v in draws.items()}),
-        "events": xr.Dataset(
-            {k: (("chain", "draw", "segment"), np.broadcast_to(v, (2, 3, 2))) for k, v in ends.items()},
-            coords={"segment": ["forward", "backward"]},
-        ),
-        "posterior_predictive": xr.Dataset({"force_x": (("chain", "draw", "sample"), np.zeros((2, 3, 4)))}),
-    }
-    tree = xr.DataTree.from_dict(groups)
-    tree.attrs = {"family": "parabola", "units": "dimensionless"}
-    return tree
-
-
-@functools.cache
-def no_posteriors():
-    """Trees that lack something."""
-    unnamed = posterior().copy()
-    unnamed.attrs = {}
-    other = posterior().copy()
-    other.attrs = {**posterior().attrs, "family": "circle"}
-    groups = {name: posterior()[name].to_dataset().isel(draw=[]) for name in ("posterior", "events")}
-    empty = xr.DataTree.from_dict(groups)
-    empty.attrs = posterior().attrs
-    words = posterior().copy()
-    words["posterior"] = xr.DataTree(xr.Dataset({k: (("chain", "draw"), [["x"]]) for k in ("a", "q", "x_c")}))
-    return [xr.DataTree(), xr.DataTree.from_dict({"posterior": xr.Dataset()}), unnamed, other, empty, words]
-
 
 def no_records():
-    bare = ideal().drop_vars("drive_angle")
+    """Datasets that lack something, and other things of the kind."""
     return [
         xr.Dataset(),
         xr.Dataset({"force_x": ("time", [1.0, 2.0])}),
-        bare,
+        ideal().drop_vars("drive_angle"),
         ideal().isel(sample=[]),
         ideal().isel(sample=0),
         ideal().drop_attrs(),
@@ -100,6 +52,17 @@ def no_records():
         ideal().to_dataframe(),
         ideal()["force_x"],
     ]
+
+
+def no_posteriors():
+    """Trees that lack something."""
+    unnamed, other, empty, words = (posterior().copy() for _ in range(4))
+    unnamed.attrs = {}
+    other.attrs = {**posterior().attrs, "family": "circle"}
+    for name in ("posterior", "events"):
+        empty[name] = xr.DataTree(posterior()[name].to_dataset().isel(draw=[]))
+    words["posterior"] = xr.DataTree(xr.Dataset({k: (("chain", "draw"), [["x"]]) for k in ("a", "q", "x_c")}))
+    return [xr.DataTree(), xr.DataTree.from_dict({"posterior": xr.Dataset()}), unnamed, other, empty, words]
 
 
 # --- What is wrong, for one argument or another ---------------------------------------------------------------------
@@ -116,7 +79,46 @@ NAMED_BY = {
     "false_alarm": "false_alarm|record",
     "file": "file|columns|missing|split_sweeps",
 }
-UNKNOWN = [{"friction": None}, {"friction": "wide"}, {"left": 0.1}, {"friction": stats.norm}, {1: 0.1}, "everything"]
+
+
+@functools.cache
+def more_wrong():
+    """Wrong values of one argument, of a function or of any, beside those that are wrong of most."""
+    bases = [[(0, 0), (1,)], [0.0, None], "here", (0.0,), (0.0, 0.0, 0.0), [(0.0, math.nan)], (math.nan, 0)]
+    return {
+        "record": no_records(),
+        "measured": no_records(),
+        "reconstruct(measured)": [*no_records(), ideal().drop_vars("force_y")],
+        "posterior": no_posteriors(),
+        "predictive_interval(posterior)": [],
+        "without_events": no_posteriors(),
+        "probability": [0.0, 1.0, 90.0],
+        "path": ["\0", "folder/\0.csv", pathlib.Path(), pathlib.Path("record.txt"), 3],
+        "base": bases,
+        "equilibria(base)": [*bases, [(0, 0), (1, 0)]],
+        "drive_angles": [["1", "2"], [90.0, 180.0], [[]]],
+        "drive_step": ["1", 1],
+        "slope_angles": [[10.0], [[0.1]]],
+        "equilibria(direction)": ["both"],
+        "gain": [np.zeros((3, 3)), [[1, 2, 3]] * 3],
+        "bias": [[0, 0, "1"], [0, 0]],
+        "zero_load(false_alarm)": [0.5],
+        "checkpoint": ["\0"],
+        "unknown": [
+            *({"friction": None}, {"friction": "wide"}, {"left": 0.1}, {"friction": stats.norm}, {1: 0.1}),
+            "everything",
+        ],
+        "file": [{"force_x": None}, {"left": "Fx"}, {"missing": ["left"]}, {"split_sweeps": 1}],
+        "Family(r)": [0.0, -1.0, stats.norm, stats.norm(0.1, 0.0)],
+        "ensembles": [1, 2.0],
+        "walkers": [2, 7],
+        "max_r_hat": [1.0],
+        "min_ess": [0.0],
+        "max_seconds": [0.0],
+        "families": [["parabola"], ["parabola", 1], ["parabola", "left"], ["circle"] * 2],
+        "draws": [2, 10, 4.0, "4"],
+        "infer_contacts(rng)": [-1],
+    }
 
 
 # --- What is right: of these a call may be accepted -----------------------------------------------------------------
@@ -155,7 +157,7 @@ def whole(low, high=math.inf):
     return lambda value: type(value) is int and low <= value <= high
 
 
-def kind(of, **attributes):
+def kind(*of, **attributes):
     return lambda value: isinstance(value, of) and all(getattr(value, name) == v for name, v in attributes.items())
 
 
@@ -192,220 +194,70 @@ def never(value):
 TINY = math.ulp(0.0)
 AT_LEAST_0, POSITIVE = number(0.0), number(TINY)
 SHARE = number(TINY, math.nextafter(1.0, 0.0))
-NO_SHARES = [0.0, 1.0, 90.0]
-FLAG = kind(bool | np.bool_)
-RNG = either(whole(0), kind(np.random.Generator), kind(np.random.SeedSequence))
-CELL_OR_NONE = either(nothing, kind(tb.LoadCell))
-SETTINGS_OR_NONE = either(nothing, kind(tb.SamplerSettings))
-PROGRESS = either(nothing, callable)
+FLAG = kind(bool, np.bool_)
 
-
-def cases(tmp_path):
-    """By name: the function, a call that is right, what is right of each argument, and more that is wrong."""
-    good = tmp_path / "good.csv"
-    tb.write_record(ideal(), good)
-    paths = {"path": ["\0", "folder/\0.csv", tmp_path, tmp_path / "record.txt", 3]}
-    of_record, of_posterior = {"measured": no_records()}, {"posterior": no_posteriors()}
-    of_random = {
-        "measured": (measured(), never),
-        "rng": (1, RNG),
-        "settings": (None, SETTINGS_OR_NONE),
-        "progress": (None, PROGRESS),
-    }
-    of_scan = {
-        "contour": (tb.contours.Parabola(0.5, 0.5), kind(tb.contours.Circle, shape=())),
-        "base": ((0.0, 0.0), pair),
-        "rig": (None, either(nothing, kind(tb.Rig))),
-    }
-    no_bases = [[(0, 0), (1,)], [0.0, None], "here", (0.0,), (0.0, 0.0, 0.0), [(0.0, math.nan)], (math.nan, 0)]
-    stated = tb.Rig(load_cell=CELL, unknown="nothing")
-    of_contour = {**of_random, "rig": (stated, either(nothing, kind(tb.Rig)))}
-    place = {"q": (0.5, numbers), "x_c": (0.0, numbers)}
-    contours = {
-        "Parabola": {"a": (0.5, numbers), **place},
-        "Circle": {"r": (0.5, numbers), **place},
-        "Ellipse": {"a": (0.5, numbers), "b": (0.4, numbers), **place},
-        "PowerLaw": {"a": (0.5, numbers), "n": (2.0, numbers), **place},
-    }
-    sheet = dict(vars(tb.LoadCell()))
-    of_sheet = {
-        **dict.fromkeys([name for name in sheet if name.endswith(("noise", "resolution"))], AT_LEAST_0),
-        **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), number(TINY, or_infinite=True)),
-        **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), number()),
-        **dict.fromkeys(("lever", "moment_curve"), pair),
-        "drift": nothing,
-        "frame": nothing,
-    }
-    of_settings = {
-        **dict.fromkeys(("block_steps", "max_steps"), whole(1, 10**9)),
-        "ensembles": whole(2, 10**9),
-        "walkers": nothing,
-        "max_r_hat": number(1.1),
-        "min_ess": POSITIVE,
-        "max_seconds": either(nothing, POSITIVE),
-        "events": FLAG,
-    }
-    of_rod = {
-        "length": (0.1, number(0.1, 10.0)),
-        "diameter": (0.0, number(0.0, 0.1)),
-        "elastic_strain": (None, either(nothing, POSITIVE)),
-    }
-    made = {
-        "scan": (
-            tb.scan,
-            {
-                **of_scan,
-                "direction": ("both", one_of("both", "forward", "backward")),
-                "drive_step": (0.1, either(nothing, number(1e-6, 0.5))),
-                "drive_angles": (None, either(nothing, row)),
-                "drive": (None, either(nothing, kind(tb.Rotation))),
-            },
-            {"base": no_bases, "drive_angles": [["1", "2"], [90.0, 180.0], [[]]], "drive_step": ["1", 1]},
-        ),
-        "equilibria": (
-            tb.equilibria,
-            {
-                **of_scan,
-                "slope_angles": ([0.1], row),
-                "direction": ("forward", one_of("forward", "backward")),
-            },
-            {"base": [*no_bases, [(0, 0), (1, 0)]], "slope_angles": [[10.0], [[0.1]]], "direction": ["both"]},
-        ),
-        "LoadCell": (
-            tb.LoadCell,
-            {name: (value, of_sheet.get(name, never)) for name, value in sheet.items()},
-            {"gain": [np.zeros((3, 3)), [[1, 2, 3]] * 3], "bias": [[0, 0, "1"], [0, 0]]},
-        ),
-        "LoadCell.measure": (
-            CELL.measure,
-            {"record": (ideal(), never), "rng": (1, RNG)},
-            {"record": no_records()},
-        ),
-        "LoadCell.from_record": (tb.LoadCell.from_record, {"record": (measured(), never)}, {"record": no_records()}),
-        "LoadCell.from_zero_load": (
-            tb.LoadCell.from_zero_load,
-            {"record": (measured(), never), "false_alarm": (1e-3, number(TINY, 0.499))},
-            {"record": no_records()},
-        ),
-        "zero_load": (
-            tb.load_cell.zero_load,
-            {"record": (measured(), never), "false_alarm": (1e-3, number(TINY, 0.499))},
-            {"record": no_records(), "false_alarm": [0.5]},
-        ),
-        "read_record": (
-            tb.read_record,
-            {"path": (good, never), "rig": (None, either(nothing, kind(tb.Rig)))},
-            paths,
-        ),
-        "write_record": (
-            tb.write_record,
-            {"record": (ideal(), never), "path": (tmp_path / "out.csv", never)},
-            {**paths, "record": no_records()},
-        ),
-        "reconstruct": (
-            tb.reconstruct,
-            {
-                "measured": (measured(), never),
-                "method": ("constrained", one_of("raw", "constrained")),
-                "rig": (stated, either(nothing, kind(tb.Rig))),
-            },
-            {**of_record, "measured": [*no_records(), ideal().drop_vars("force_y")]},
-        ),
-        "infer_contour": (
-            tb.infer_contour,
-            {
-                **of_contour,
-                "family": ("parabola", never),
-                "checkpoint": (None, either(nothing, one_of("left", "0.1"))),
-            },
-            {**of_record, "checkpoint": ["\0"]},
-        ),
-        "Rig": (
-            tb.Rig,
-            {
-                "rod": (None, either(nothing, kind(tb.Rod))),
-                "load_cell": (CELL, CELL_OR_NONE),
-                "unknown": ({}, either(empty(dict), one_of("nothing"))),
-                "file": ({}, empty(dict)),
-            },
-            {
-                "unknown": UNKNOWN,
-                "file": [{"force_x": None}, {"left": "Fx"}, {"missing": ["left"]}, {"split_sweeps": 1}],
-            },
-        ),
-        "Family": (
-            functools.partial(tb.Family, "circle"),
-            {"r": (0.2, either(POSITIVE, frozen)), "x_c": (0.0, either(number(), frozen))},
-            {"r": [0.0, -1.0, stats.norm, stats.norm(0.1, 0.0)]},
-        ),
-        "SamplerSettings": (
-            tb.SamplerSettings,
-            {name: (value, of_settings[name]) for name, value in vars(tb.SamplerSettings()).items()},
-            {"ensembles": [1, 2.0], "walkers": [2, 7], "max_r_hat": [1.0], "min_ess": [0.0], "max_seconds": [0.0]},
-        ),
-        "contour_band": (
-            tb.contour_band,
-            {
-                "posterior": (posterior(), never),
-                "x": ([0.0, 0.1], lambda value: row(value) or empty(list)(value)),
-                "probability": (0.9, SHARE),
-                "simultaneous": (False, FLAG),
-            },
-            {**of_posterior, "x": [[[0.0, 1.0]], [0.0, math.nan]], "probability": NO_SHARES},
-        ),
-        "predictive_interval": (
-            tb.uncertainty.predictive_interval,
-            {"posterior": (posterior(), never), "probability": (0.9, SHARE)},
-            {"probability": NO_SHARES},
-        ),
-        "gap": (
-            tb.gap,
-            {"posterior": (posterior(), never), "probability": (0.9, SHARE), "without_events": (None, nothing)},
-            {**of_posterior, "without_events": no_posteriors(), "probability": NO_SHARES},
-        ),
-        **{name: (getattr(tb.contours, name), arguments, {}) for name, arguments in contours.items()},
-        "Rod": (tb.Rod, {**of_rod, "flexural_rigidity": (1.0, POSITIVE)}, {}),
-        "Rod.circular": (
-            tb.Rod.circular,
-            {**of_rod, "diameter": (1e-3, number(1e-3, 0.1)), "youngs_modulus": (2e11, number(1.0, 1e12))},
-            {},
-        ),
-        "compare_families": (
-            tb.compare_families,
-            {
-                **{name: of_random[name] for name in ("measured", "rng", "settings", "progress")},
-                "rig": (stated, either(nothing, kind(tb.Rig))),
-                "families": (["parabola", "circle"], never),
-                "leave_one_out": (False, FLAG),
-                "false_alarm": (1e-3, SHARE),
-            },
-            {
-                **of_record,
-                "families": [["parabola"], ["parabola", 1], ["parabola", "left"], ["circle"] * 2],
-            },
-        ),
-        "infer_contacts": (
-            tb.infer_contacts,
-            {
-                **{name: of_random[name] for name in ("measured", "rng", "progress")},
-                "rig": (stated, either(nothing, kind(tb.Rig))),
-                "prior": ("flat", one_of("flat", "polar")),
-                "draws": (4, lambda value: whole(4, 10**6)(value) and value % 4 == 0),
-            },
-            {**of_record, "draws": [2, 10, 4.0, "4"], "rng": [-1]},
-        ),
-    }
-    assert set(made) == set(CASES)
-    return made
-
-
-CASES = (
+# By argument, of a function or of any; nothing else is right of those that are not named.
+RIGHT = {
+    "contour": kind(tb.contours.Circle, shape=()),
+    **dict.fromkeys(("a", "b", "n", "q", "r", "x_c"), numbers),
+    "base": pair,
+    "rig": either(nothing, kind(tb.Rig)),
+    "direction": one_of("both", "forward", "backward"),
+    "equilibria(direction)": one_of("forward", "backward"),
+    "drive": either(nothing, kind(tb.Rotation)),
+    "drive_step": either(nothing, number(1e-6, 0.5)),
+    "drive_angles": either(nothing, row),
+    "slope_angles": row,
+    "rng": either(whole(0), kind(np.random.Generator, np.random.SeedSequence)),
+    "settings": either(nothing, kind(tb.SamplerSettings)),
+    **dict.fromkeys(("progress", "keep"), either(nothing, callable)),
+    "checkpoint": either(nothing, one_of("left", "0.1")),
+    "method": one_of("raw", "constrained"),
+    "prior": one_of("flat", "polar"),
+    "draws": lambda value: whole(4, 10**6)(value) and value % 4 == 0,
+    "x": lambda value: row(value) or empty(list)(value),
+    "probability": SHARE,
+    **dict.fromkeys(("simultaneous", "leave_one_out", "events"), FLAG),
+    "without_events": nothing,
+    "false_alarm": number(TINY, 0.499),
+    "compare_families(false_alarm)": SHARE,
+    # Load cells
+    **{name: AT_LEAST_0 for name in vars(CELL) if name.endswith(("noise", "resolution"))},
+    **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), number(TINY, or_infinite=True)),
+    **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), number()),
+    **dict.fromkeys(("lever", "moment_curve"), pair),
+    **dict.fromkeys(("drift", "frame", "calibration"), nothing),
+    # Rods
+    "length": number(0.1, 10.0),
+    "flexural_rigidity": POSITIVE,
+    "diameter": number(0.0, 0.1),
+    "Rod.circular(diameter)": number(1e-3, 0.1),
+    "youngs_modulus": number(1.0, 1e12),
+    "elastic_strain": either(nothing, POSITIVE),
+    "rest_curvature": number(),
+    "taper": number(0.0, 1.0),
+    **dict.fromkeys(("stem", "rest_curvature_deviation", "taper_deviation"), AT_LEAST_0),
+    "rigidity_profile": either(nothing, POSITIVE),
+    "rest_shape_modes": empty(list, np.ndarray),
+    # Rigs and families
+    "rod": either(nothing, kind(tb.Rod)),
+    "load_cell": either(nothing, kind(tb.LoadCell)),
+    "unknown": either(empty(dict), one_of("nothing")),
+    "file": empty(dict),
+    "Family(r)": either(POSITIVE, frozen),
+    "Family(x_c)": either(number(), frozen),
+    # Settings of samplers
+    **dict.fromkeys(("block_steps", "max_steps"), whole(1, 10**9)),
+    "ensembles": whole(2, 10**9),
+    "walkers": nothing,
+    "max_r_hat": number(1.1),
+    "min_ess": POSITIVE,
+    "max_seconds": either(nothing, POSITIVE),
+}
+NAMES = (
     "scan",
     "equilibria",
-    "LoadCell",
-    "LoadCell.measure",
-    "LoadCell.from_record",
-    "LoadCell.from_zero_load",
+    *(f"LoadCell{method}" for method in ("", ".measure", ".from_record", ".from_zero_load")),
     "zero_load",
     "read_record",
     "write_record",
@@ -417,10 +269,7 @@ CASES = (
     "contour_band",
     "predictive_interval",
     "gap",
-    "Parabola",
-    "Circle",
-    "Ellipse",
-    "PowerLaw",
+    *(f"contours.{family}" for family in ("Parabola", "Circle", "Ellipse", "PowerLaw")),
     "Rod",
     "Rod.circular",
     "compare_families",
@@ -428,21 +277,18 @@ CASES = (
 )
 
 
-@pytest.fixture
-def before_sampling(monkeypatch, tmp_path):
-    """Have calls that would sample end where they would begin to."""
-
-    end_before_sampling(monkeypatch)
-    monkeypatch.chdir(tmp_path)
+def for_argument(table, name, argument, otherwise):
+    """What a table says of an argument of this function, or else of any."""
+    return table.get(f"{name}({argument})", table.get(argument, otherwise))
 
 
-def refusal(call, **options):
+def refusal(call, **wrong):
     """The words in which a call is refused, if it is; another error than one of the package, or a foreign warning,
     fails the test."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TactileBayesWarning)
         try:
-            call(**options)
+            call.function(**{**call.arguments, **wrong})
         except AcceptedError:
             return None
         except FileNotFoundError:  # as `read_record` says, of a path
@@ -455,43 +301,53 @@ def refusal(call, **options):
     return said
 
 
+@pytest.mark.usefixtures("before_sampling")
 @pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", CASES)
-def test_a_wrong_argument_is_refused_in_words(name, every, before_sampling, tmp_path):
+@pytest.mark.parametrize("name", NAMES)
+def test_a_wrong_argument_is_refused_in_words(name, every, calls):
     """Of what is wrong anywhere each argument is given every third, beside all that is wrong of it alone."""
-    call, arguments, more = cases(tmp_path)[name]
-    usual = {argument: value for argument, (value, _) in arguments.items()}
-    assert refusal(call, **usual) is None
-    for number, (argument, (_, is_right)) in enumerate(arguments.items()):
+    assert refusal(calls[name]) is None
+    for number, argument in enumerate(calls[name].arguments):
+        is_right = for_argument(RIGHT, name, argument, never)
         named = NAMED_BY.get(argument, f"{argument}|{argument.replace('_', ' ')}")
-        for value in [*WRONG[number % every :: every], *more.get(argument, [])]:
-            said = refusal(call, **{**usual, argument: value})
+        for value in [*WRONG[number % every :: every], *for_argument(more_wrong(), name, argument, [])]:
+            said = refusal(calls[name], **{argument: value})
             if said is None:
                 assert is_right(value), f"{name}({argument}={shown(value)}) was accepted"
             else:
                 assert re.search(rf"(?<!\w)({named})(?!\w)", said), f"{name}({argument}={shown(value)}): {said}"
 
 
+@pytest.mark.usefixtures("before_sampling")
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
-def test_wrong_arguments_in_pairs_are_refused_in_words(name, before_sampling, tmp_path):
+@pytest.mark.parametrize("name", NAMES)
+def test_wrong_arguments_in_pairs_are_refused_in_words(name, calls):
     """A thousand pairs of them for each name."""
-    rng = np.random.default_rng(CASES.index(name))
-    call, arguments, more = cases(tmp_path)[name]
-    usual = {argument: value for argument, (value, _) in arguments.items()}
-    values = {argument: [*WRONG, *more.get(argument, [])] for argument in arguments}
+    rng = np.random.default_rng(NAMES.index(name))
+    arguments = list(calls[name].arguments)
+    values = {argument: [*WRONG, *for_argument(more_wrong(), name, argument, [])] for argument in arguments}
     for _ in range(1000):
-        chosen = map(str, rng.choice(list(arguments), size=min(2, len(arguments)), replace=False))
+        chosen = map(str, rng.choice(arguments, size=min(2, len(arguments)), replace=False))
         wrong = {argument: values[argument][rng.integers(len(values[argument]))] for argument in chosen}
-        if refusal(call, **{**usual, **wrong}) is None and not vacuous(wrong):
+        if refusal(calls[name], **wrong) is None and not vacuous(wrong):
             for argument, value in wrong.items():
-                assert arguments[argument][1](value), f"{name}({argument}={shown(value)}) was accepted"
+                is_right = for_argument(RIGHT, name, argument, never)
+                assert is_right(value), f"{name}({argument}={shown(value)}) was accepted"
 
 
-def test_an_unknown_keyword_is_python_s_to_refuse(tmp_path):
-    for name, (call, arguments, _) in cases(tmp_path).items():
-        with refused(ParameterError if name == "Family" else TypeError, "left"):
-            call(**{argument: value for argument, (value, _) in arguments.items()}, left=1)
+@pytest.mark.usefixtures("before_sampling")
+def test_a_switch_takes_true_and_false_alone(calls):
+    """An argument that is a boolean by its annotation or its default."""
+    found = []
+    for name, call in calls.items():
+        for parameter in inspect.signature(call.function).parameters.values():
+            if parameter.annotation in (bool, "bool") or isinstance(parameter.default, bool):
+                found.append((name, parameter.name))
+                for value in ("no", 0, None):
+                    said = refusal(call, **{parameter.name: value})
+                    assert said is not None, (*found[-1], value)
+                    assert f"{parameter.name} is {value!r}: give True or False" in said, (*found[-1], value)
+    assert {("datasets.record", "truth"), ("design", "nested")} <= set(found)
 
 
 # --- The checks themselves ------------------------------------------------------------------------------------------
@@ -557,84 +413,6 @@ def test_checks_return_what_they_checked_as_it_is_used():
 def test_what_is_long_is_shown_by_its_kind():
     assert shown(xr.Dataset()) == "a Dataset"
     assert shown(np.zeros((50, 50))) == "a ndarray of shape (50, 50)"
-
-
-# --- Switches -----------------------------------------------------------------------------------------------------
-
-
-def switches():
-    """(name of a public function, its boolean parameter), by annotation or default."""
-    for module, name, _ in public():
-        value = getattr(module, name)
-        methods = [f"{name}.{own}" for own in dir(value) if inspect.isclass(value) and not own.startswith("_")]
-        for label in [name, *methods]:
-            function = functools.reduce(getattr, label.split("."), module)
-            if not callable(function) or inspect.ismodule(function):
-                continue
-            with contextlib.suppress(ValueError, TypeError):  # of some builtins
-                for parameter in inspect.signature(function).parameters.values():
-                    if parameter.annotation in (bool, "bool") or isinstance(parameter.default, bool):
-                        yield module, label, parameter.name
-
-
-def required():
-    """Values of required parameters, by name."""
-    contours = [{"family": "parabola", "a": 0.6, "q": 0.5}]
-    return {
-        "bands": {},
-        "axial": np.linspace(0.1, 0.2, 12),
-        "contour": tb.contours.Circle(0.5, 0.5),
-        "families": ["parabola", "circle"],
-        "gauge": {"r": 0.5, "q": 0.5},
-        "index": 0,
-        "known": "parabola",
-        "lateral": np.linspace(0.01, 0.02, 12),
-        "measured": measured(),
-        "name": "part",
-        "number": 0,
-        "parameters": {"r": 0.5, "q": 0.5},
-        "path": pathlib.Path(__file__).parents[1] / "data" / "synthetic" / "rig.csv",
-        "polyline": tb.contours.Polyline([[(0.0, 0.0), (1.0, 0.0)]]),
-        "posterior": posterior_with_prior(),
-        "predicted": [[[0.1, 0.1, 0.1]]],
-        "reading": np.linspace(1.0, 2.0, 12),
-        "record": measured(),
-        "records": measured(),
-        "run_or_posterior": posterior_with_prior(),
-        "rng": 0,
-        "self": CELL,
-        "source": {"records": 1, "seed": 1, "contours": contours},
-        "x": [0.0, 0.1],
-    }
-
-
-def posterior_with_prior():
-    tree = posterior().copy()
-    tree["prior"] = tree["posterior"].copy()
-    tree["constant_data"] = xr.DataTree(xr.Dataset())
-    return tree
-
-
-@pytest.mark.parametrize("value", ["no", 0, None], ids=repr)
-@pytest.mark.parametrize(
-    ("module", "label", "name"), list(switches()), ids=lambda part: getattr(part, "__name__", part)
-)
-def test_a_switch_takes_true_and_false_alone(module, label, name, value):
-    if label == "Specification":
-        given = vars(tb.datasets.read_specification(required()["source"])) | {name: value}
-    else:
-        function = functools.reduce(getattr, label.split("."), module)
-        needed = inspect.signature(function).parameters.values()
-        kinds = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
-        table = required()
-        given = {one.name: table[one.name] for one in needed if one.default is one.empty and one.kind not in kinds}
-        given[name] = value
-    with refused(ParameterError, f"{name} is {value!r}: give True or False"):
-        functools.reduce(getattr, label.split("."), module)(**given)
-
-
-def test_the_switches_are_found():
-    assert {("record", "truth"), ("design", "nested")} <= {(label, name) for _, label, name in switches()}
 
 
 def test_a_masked_number_is_none():

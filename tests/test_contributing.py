@@ -41,39 +41,17 @@ def applied(found: list[Block], clone: Path) -> list[Block]:
     return rest
 
 
-def copied(folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the source, to which one thing after the other is added."""
+    folder = tmp_path_factory.mktemp("clone")
     # With what has been compiled, which takes half a minute.
     shutil.copytree(ROOT / "src" / "tactile_bayes", folder / "src" / "tactile_bayes")
     return folder
 
 
-@pytest.fixture(scope="module")
-def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the source, to which one thing after the other is added."""
-    return copied(tmp_path_factory.mktemp("clone"))
-
-
-TITLES = ("A family of contours", "A flaw of a load cell", "An unknown of a rig")
-
-
-def test_all_that_is_added_fits_the_source(tmp_path: Path) -> None:
-    """And leaves Python behind."""
-    copy = copied(tmp_path)
-    for title in TITLES:
-        example, _ = applied(blocks(PARTS[title]), copy)
-        compile(example.code, title, "exec")
-    for path in copy.rglob("*.py"):
-        compile(path.read_text(encoding="utf-8"), path, "exec", dont_inherit=True)
-
-
-@pytest.mark.parametrize(
-    "title",
-    [
-        pytest.param("A family of contours", marks=pytest.mark.slow),
-        "A flaw of a load cell",
-        pytest.param("An unknown of a rig", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("title", ["A family of contours", "A flaw of a load cell", "An unknown of a rig"])
 def test_what_is_added_works(title: str, clone: Path) -> None:
     example, stated = applied(blocks(PARTS[title]), clone)
     environment = os.environ | {"PYTHONPATH": str(clone / "src"), "PYTHONWARNINGS": "error"}

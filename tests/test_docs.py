@@ -43,15 +43,23 @@ def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings_left_alone: 
     return tmp_path
 
 
-@pytest.mark.parametrize("path", pages_tested("fast"), ids=identify)
+@pytest.mark.parametrize(
+    "path",
+    [*pages_tested("fast"), *(pytest.param(path, marks=pytest.mark.slow) for path in pages_tested("slow"))],
+    ids=identify,
+)
 def test_blocks_run_and_print_what_the_page_says(path: Path, clone: Path) -> None:
     assert run(path, TEXTS[path]) > 0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", pages_tested("slow"), ids=identify)
-def test_slow_blocks_run_and_print_what_the_page_says(path: Path, clone: Path) -> None:
-    assert run(path, TEXTS[path]) > 0
+def test_the_example_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (example,) = (block for block in blocks(TEXTS[ROOT / "README.md"]) if block.language == "python")
+    names: dict = {}
+    exec(compile(example.code, "README.md", "exec"), names)
+    assert names["posterior"].attrs["converged"], names["posterior"].attrs["message"]
+    assert (names["band"]["lower"] < names["band"]["upper"]).all()
+    assert "converged" in capsys.readouterr().out
 
 
 def test_a_rigs_file_says_what_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,32 +132,28 @@ def test_every_command_is_named() -> None:
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
 def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
-    for block in blocks(TEXTS[path]):
-        if block.language != "sh":
-            continue
-        for words in commands(block.code):
-            named = tuple(word for word in words if not word.startswith("--"))
-            known = next(named[:count] for count in (2, 1, 0) if named[:count] in COMMANDS)
-            assert known or not named, f"there is no command {' '.join(words)}"
-            options = {option for parameter in COMMANDS[known].params for option in parameter.opts}
-            used = {word.split("=")[0] for word in words if word.startswith("--")}
-            assert used <= options, f"{' '.join(known)} has no option {used - options}"
+    shell = "".join(block.code for block in blocks(TEXTS[path]) if block.language == "sh")
+    for words in commands(shell):
+        named = tuple(word for word in words if not word.startswith("--"))
+        known = next(named[:count] for count in (2, 1, 0) if named[:count] in COMMANDS)
+        assert known or not named, f"there is no command {' '.join(words)}"
+        options = {option for parameter in COMMANDS[known].params for option in parameter.opts}
+        used = {word.split("=")[0] for word in words if word.startswith("--")}
+        assert used <= options, f"{' '.join(known)} has no option {used - options}"
 
 
 @pytest.mark.parametrize(
-    ("families", "noise", "page"),
+    ("families", "noise"),
     [
-        (FAMILIES, "usual", DOCS / "trust.md"),
-        pytest.param(FAMILIES, "tenth", DOCS / "trust.md", marks=pytest.mark.slow),
-        (FAMILIES, "threefold", DOCS / "trust.md"),
-        (STICKING, "usual", DOCS / "trust.md"),
-        (TRACED, "usual", DOCS / "trust.md"),
+        (FAMILIES, "usual"),
+        pytest.param(FAMILIES, "tenth", marks=pytest.mark.slow),
+        (FAMILIES, "threefold"),
+        (STICKING, "usual"),
+        (TRACED, "usual"),
     ],
 )
-def test_a_table_of_calibrations_is_that_of_the_published_replicates(
-    families: dict[str, Family], noise: str, page: Path
-) -> None:
-    assert table(noise, published(families, noise)) in TEXTS[page]
+def test_a_table_of_calibrations_is_that_of_the_published_replicates(families: dict[str, Family], noise: str) -> None:
+    assert table(noise, published(families, noise)) in TEXTS[DOCS / "trust.md"]
 
 
 def test_readme_shows_rows_of_tables_in_the_docs() -> None:

@@ -13,19 +13,15 @@ def test_they_are_numbered():
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_is_kept_without_outputs(path):
+def test_a_notebook_begins_with_its_number_and_title_and_is_kept_without_outputs(path):
     book = json.loads(path.read_text(encoding="utf-8"))
     assert book["metadata"]["kernelspec"]["name"] == "python3"
+    first = book["cells"][0]
+    assert first["cell_type"] == "markdown"
+    assert first["source"][0].startswith(f"# {int(path.name.split('_')[0])} · ")
     for cell in book["cells"]:
         if cell["cell_type"] == "code":
             assert cell["outputs"] == []
             assert cell["execution_count"] is None
     names = [cell["id"] for cell in book["cells"]]
     assert len(set(names)) == len(names)
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_begins_with_its_number_and_title(path):
-    first = json.loads(path.read_text(encoding="utf-8"))["cells"][0]
-    assert first["cell_type"] == "markdown"
-    assert first["source"][0].startswith(f"# {int(path.name.split('_')[0])} · ")

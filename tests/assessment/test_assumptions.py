@@ -8,6 +8,7 @@ from helpers.contour_posteriors import posterior, swept
 from tactile_bayes.assessment import assumptions as module
 from tactile_bayes.assessment.assumptions import alternatives_of, band_by_assumption
 from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.stored_experiment import experiment_of
@@ -31,6 +32,9 @@ def unknown_of(alternative):
     return alternative.experiment.unknowns.names
 
 
+TWO_PIVOTS = ((0.0, 0.0), (0.2, 0.0))
+
+
 def test_each_unknown_is_added_or_fixed_and_each_other_family_tried():
     found = names_of(only("bias", "friction"))
     assert unknown_of(found["bias as stated"]) == ("friction",)
@@ -39,29 +43,23 @@ def test_each_unknown_is_added_or_fixed_and_each_other_family_tried():
     assert found["family circle"].experiment.own_family == Family("circle")
     assert "family parabola" not in found
     assert "base inferred" not in found  # there is one pivot
-    assert "base inferred" in names_of(only(), bases=((0.0, 0.0), (0.2, 0.0)))
+    assert "base inferred" in names_of(only(), bases=TWO_PIVOTS)
+    assert "friction inferred" in names_of(only())
+    assert "friction inferred" not in names_of(only().with_unknown(friction=0.2))
+    # Gains take the place of the rigidity, which has the same effect.
+    gains = names_of(only("rigidity_scale"))["gain inferred for rigidity_scale"]
+    assert unknown_of(gains) == ("moment_gain", "force_x_gain", "force_y_gain")
 
 
 def test_what_is_fixed_has_the_value_that_rod_and_load_cell_state():
-    rod = Rod(rest_curvature=0.1, stem=0.02)
-    rig = replace(only("rest_curvature", "stem", "moment_curve", "base"), rod=rod)
-    found = names_of(rig, bases=((0.0, 0.0), (0.2, 0.0)))
-    for group in ("rest_curvature", "stem", "base"):
+    rig = replace(only("rest_curvature", "stem", "moment_curve", "base"), rod=Rod(rest_curvature=0.1, stem=0.02))
+    found = names_of(rig, bases=TWO_PIVOTS)
+    every = set(unknown_of(found["family circle"]))
+    parameters = {"rest_curvature": {"rest_curvature"}, "stem": {"stem"}, "base": {"base_2_x", "base_2_y"}}
+    for group, names in parameters.items():
         fixed = found[f"{group} as stated"].experiment
-        assert set(names_of_group(group)).isdisjoint(fixed.unknowns.names)
-        assert len(fixed.unknowns.names) == len(Experiment(fixed.record, rig).unknowns.names) - len(
-            names_of_group(group)
-        )
+        assert set(fixed.unknowns.names) == every - names
         assert fixed.unknowns.known == {}  # none deviates from what is stated
-
-
-def names_of_group(group):
-    return ("base_2_x", "base_2_y") if group == "base" else (group,)
-
-
-def test_gains_take_the_place_of_the_rigidity_which_has_the_same_effect():
-    found = names_of(only("rigidity_scale"))["gain inferred for rigidity_scale"]
-    assert unknown_of(found) == ("moment_gain", "force_x_gain", "force_y_gain")
 
 
 def test_a_discrepancy_stays_in_every_alternative():
@@ -83,11 +81,6 @@ def test_a_calibrated_rig_does_not_add_what_is_fixed():
     assert set(unknown_of(found["family circle"])) == set(priors)
     gains = unknown_of(found["gain inferred for rigidity_scale"])
     assert set(gains) == {"lever_x", "moment_gain", "force_x_gain", "force_y_gain"}
-
-
-def test_friction_that_is_known_is_not_inferred():
-    assert "friction inferred" in names_of(only())
-    assert "friction inferred" not in names_of(only().with_unknown(friction=0.2))
 
 
 def test_priors_of_what_remains_are_kept():
@@ -118,8 +111,6 @@ def test_bands_are_compared_and_errors_are_outcomes(monkeypatch, tmp_path):
 
 @pytest.mark.slow
 def test_an_alternative_without_a_posterior_is_named(monkeypatch):
-    from tactile_bayes.errors import InferenceError
-
     def fail(*given, **options):
         raise InferenceError("no contour")
 

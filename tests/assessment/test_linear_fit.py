@@ -88,6 +88,11 @@ def test_the_ratio_has_an_f_distribution_if_the_model_holds():
 SCALES = np.array([0.003, 0.002, 0.003, 0.03])
 
 
+def model_of(cell, **options):
+    record = cell.measure(swept(Parabola(**TRUTH), **options), rng=11)
+    return Experiment(record, rig=Rig(load_cell=cell, unknown="nothing")).model
+
+
 @pytest.mark.parametrize(
     "errors",
     [
@@ -100,9 +105,7 @@ SCALES = np.array([0.003, 0.002, 0.003, 0.03])
 )
 def test_residuals_of_a_record_of_the_model_have_unit_variance(errors):
     """Some 600 residuals: their mean square scatters by 6 %, and the best of a record away from its start as well."""
-    cell = replace(CELL, **errors)
-    record = cell.measure(swept(Parabola(**TRUTH)), rng=11)
-    model = Experiment(record, rig=Rig(load_cell=cell, unknown="nothing")).model
+    model = model_of(replace(CELL, **errors))
     starts = np.array([[*TRUTH.values(), 1.0], [0.51, 0.495, 0.004, 1.0]])
     at, away = Linearisation(model, SCALES).fits(np.stack([model.likelihood.measured] * 2), starts)
     assert at.scatter == pytest.approx(1.0, abs=0.25)
@@ -112,23 +115,15 @@ def test_residuals_of_a_record_of_the_model_have_unit_variance(errors):
 
 def test_too_many_readings_that_share_errors_are_refused():
     cell = replace(CELL, drift=RandomWalk(moment=0.01, force=0.02))
-    record = cell.measure(swept(Parabola(**TRUTH), step=np.radians(0.07)), rng=11)
-    model = Experiment(record, rig=Rig(load_cell=cell, unknown="nothing")).model
     with pytest.raises(InferenceError, match="2000 are possible"):
-        Linearisation(model, SCALES)
+        Linearisation(model_of(cell, step=np.radians(0.07)), SCALES)
 
 
-def test_out_of_reach_there_is_no_fit():
-    record = CELL.measure(swept(Parabola(**TRUTH)), rng=11)
-    model = Experiment(record, rig=Rig(load_cell=CELL, unknown="nothing")).model
-    starts = np.array([[0.5, 3.0, 0.0, 1.0]])
-    assert Linearisation(model, SCALES).fits(model.likelihood.measured[None], starts) == [None]
-
-
-def test_differences_stay_within_the_bounds_of_parameters():
+def test_out_of_reach_there_is_no_fit_and_differences_stay_within_the_bounds_of_parameters():
     """A posterior that is wide over a parameter's size reaches the bound, at which there is no contour."""
-    record = CELL.measure(swept(Parabola(**TRUTH)), rng=11)
-    model = Experiment(record, rig=Rig(load_cell=CELL, unknown="nothing")).model
+    model = model_of(CELL)
+    readings = model.likelihood.measured[None]
+    assert Linearisation(model, SCALES).fits(readings, np.array([[0.5, 3.0, 0.0, 1.0]])) == [None]
     starts = np.array([[1e-3, TRUTH["q"], TRUTH["x_c"], 1.0]])
-    (found,) = Linearisation(model, np.array([10.0, *SCALES[1:]])).fits(model.likelihood.measured[None], starts)
+    (found,) = Linearisation(model, np.array([10.0, *SCALES[1:]])).fits(readings, starts)
     assert np.isfinite(found.residuals).all()

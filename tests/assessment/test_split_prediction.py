@@ -52,16 +52,14 @@ def test_noise_that_is_known_and_larger_than_stated_shows():
 
 def test_parts_are_sweeps_pivots_and_halves():
     record = swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.0)), step=0.1)
-    parts = parts_of(Experiment(record, rig=Rig(load_cell=CELL, unknown="nothing")).model)
-    names = ["sweep 1", "sweep 2", "sweep 3", "sweep 4", "pivot 1", "pivot 2", "earlier half", "later half"]
-    assert list(parts) == names
+    rig = Rig(load_cell=CELL, unknown="nothing")
+    parts = parts_of(Experiment(record, rig=rig).model)
+    sweeps = [f"sweep {number}" for number in (1, 2, 3, 4)]
+    assert list(parts) == [*sweeps, "pivot 1", "pivot 2", "earlier half", "later half"]
     assert (parts["pivot 1"] == (record.base_x.values == 0.0)).all()
     assert (parts["earlier half"] == ~parts["later half"]).all()
     one = record.isel(sample=record.sweep.values == record.sweep.values[0])
-    assert list(parts_of(Experiment(one, rig=Rig(load_cell=CELL, unknown="nothing")).model)) == [
-        "earlier half",
-        "later half",
-    ]
+    assert list(parts_of(Experiment(one, rig=rig).model)) == ["earlier half", "later half"]
 
 
 def test_too_few_predictions_are_refused():

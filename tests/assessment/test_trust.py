@@ -7,7 +7,7 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL, SOUND, infer_as_stated, measured, posterior, swept
-from tactile_bayes.assessment.trust import draws_digest, trust
+from tactile_bayes.assessment.trust import _corrected, draws_digest, trust
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import write_result
 
@@ -86,8 +86,6 @@ def test_the_check_uses_it():
 
 
 def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():
-    from tactile_bayes.assessment.trust import _corrected
-
     x = np.linspace(-1.0, 1.0, 5)
     found = xr.Dataset(
         {
@@ -106,22 +104,37 @@ def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():
 
 
 @pytest.mark.slow
-def test_a_run_and_its_file_are_taken_and_other_things_refused(tmp_path):
+def test_a_run_and_its_file_are_taken(tmp_path):
     write_result(posterior(), tmp_path / "posterior.nc")
     assert trust(tmp_path, rng=1, replicates=0, assumptions=False).equals(right())
-    with pytest.raises(InferenceError, match="there is no file"):
-        trust(str(tmp_path / "nothing"), rng=1)
-    with pytest.raises(ParameterError, match="run_or_posterior is 3"):
-        trust(3, rng=1)
-    with pytest.raises(ParameterError, match="replicates"):
-        trust(posterior(), rng=1, replicates=-1)
 
 
-def test_a_posterior_of_contacts_alone_is_refused():
+def of_contacts_alone():
     tree = posterior().copy()
     tree.attrs = {**tree.attrs, "events": 0}
-    with pytest.raises(InferenceError, match="events=False"):
-        trust(tree, rng=1)
+    return tree
+
+
+def of_few_loaded_samples():
+    tree = posterior().copy()
+    events = tree["events"].to_dataset()
+    tree["events"] = xr.DataTree(events.assign(snap_off_drive_angle=events["first_drive_angle"]))
+    return tree
+
+
+@pytest.mark.parametrize(
+    ("run", "options", "error", "named"),
+    [
+        (lambda: "no such folder", {}, InferenceError, "no such folder"),
+        (lambda: 3, {}, ParameterError, "run_or_posterior is 3"),
+        (posterior, {"replicates": -1}, ParameterError, "replicates"),
+        (of_contacts_alone, {}, InferenceError, "events=False"),
+        pytest.param(of_few_loaded_samples, {}, InferenceError, "too few to judge", marks=pytest.mark.slow),
+    ],
+)
+def test_what_cannot_be_judged_is_refused(run, options, error, named):
+    with pytest.raises(error, match=named):
+        trust(run(), rng=1, **({"replicates": 0, "assumptions": False} | options))
 
 
 @pytest.mark.slow
@@ -133,11 +146,3 @@ def test_a_distribution_that_is_none_of_scipys_has_to_be_given_again():
     with pytest.raises(ParameterError, match="does not state its family"):
         trust(tree, rng=1, replicates=0, assumptions=False)
     assert trust(tree, rng=1, family=family, replicates=0, assumptions=False).attrs["conclusion"] == "holds"
-
-
-def test_too_few_loaded_samples_are_refused_with_the_reason():
-    tree = posterior().copy()
-    events = tree["events"].to_dataset()
-    tree["events"] = xr.DataTree(events.assign(snap_off_drive_angle=events["first_drive_angle"]))
-    with pytest.raises(InferenceError, match="too few to judge"):
-        trust(tree, rng=1, replicates=0, assumptions=False)

@@ -72,6 +72,10 @@ def noted(monkeypatch):
     return numbers
 
 
+def rows_of(folder):
+    return json.loads((folder / REPLICATES.file).read_text(encoding="utf-8"))["replicates"]
+
+
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     """Two replicates of few steps, in this process, and where they are kept."""
@@ -85,7 +89,8 @@ def small(tmp_path_factory):
 def test_what_is_found(small):
     found, _ = small
     assert found.sizes == {"replicate": 2, "quantity": 7, "claim": 6}
-    assert sorted(found.quantity.values) == sorted([*PRIORS, "noise_scale", "log_likelihood", *SNAP_OFFS])
+    snap_offs = ("snap_off_forward", "snap_off_backward")
+    assert sorted(found.quantity.values) == sorted([*PRIORS, "noise_scale", "log_likelihood", *snap_offs])
     assert np.all((found["ranks"] >= 0) & (found["ranks"] <= 99))
     assert np.all((found.coverage >= 0.0) & (found.coverage <= 1.0))
     assert np.all(found.width_in_gap > 0.0)
@@ -93,28 +98,11 @@ def test_what_is_found(small):
     assert (found.attrs["conclusion"], found.attrs["replicates"]) == ("too few", 2)
 
 
-SNAP_OFFS = ("snap_off_forward", "snap_off_backward")
-
-
-def test_what_is_kept_is_all_there_is(small, monkeypatch):
-    """A second call makes nothing, and finds the same, to the last digit."""
-    found, folder = small
-    monkeypatch.setattr(module, "replicate", pytest.fail)
-    assert quickly(settings=FEW_STEPS, out=folder).identical(found)
-    assert [path.name for path in folder.iterdir()] == [REPLICATES.file]
-
-
 @pytest.mark.slow
 def test_workers_change_nothing_but_the_seconds(small):
     found, _ = small
     other = quickly(settings=FEW_STEPS, workers=2)
     assert other.drop_vars("seconds").identical(found.drop_vars("seconds"))
-
-
-def test_replicates_do_not_depend_on_how_many_there_are(noted):
-    three, five = quickly(replicates=3), quickly(replicates=5)
-    np.testing.assert_array_equal(three["ranks"], five["ranks"][:3])
-    assert not np.array_equal(three["ranks"], quickly(replicates=3, rng=2)["ranks"])
 
 
 # ---- what is lost
@@ -133,75 +121,41 @@ def test_a_failure_is_an_outcome_whatever_it_comes_from(with_lost):
     found, folder = with_lost
     assert (found.sizes["replicate"], found.attrs["lost"]) == (4, 3)
     np.testing.assert_array_equal((found["ranks"] >= 0).any("quantity"), [False, False, False, True])
-    rows = json.loads((folder / REPLICATES.file).read_text(encoding="utf-8"))["replicates"]
+    rows = rows_of(folder)
     for number, (stage, words) in enumerate(STAGES.items()):
-        row = rows[number]
-        assert (row["number"], row["ranks"], row["message"]) == (number, {}, f"StrangeError: an error {words}")
+        row, message = rows[number], f"StrangeError: an error {words}"
+        assert (row["number"], row["ranks"], row["message"]) == (number, {}, message)
         assert f"{stage}(" in row["traceback"]
-        assert row["traceback"].endswith(f"StrangeError: an error {words}\n")
-        assert (str(found.message[number].values), str(found.traceback[number].values)) == (
-            row["message"],
-            row["traceback"],
-        )
+        assert row["traceback"].endswith(f"{message}\n")
+        assert (str(found.message[number].values), str(found.traceback[number].values)) == (message, row["traceback"])
     assert "traceback" not in rows[3]
     assert str(found.traceback[3].values) == ""
-
-
-def test_what_is_lost_holds_nowhere(with_lost):
-    found, _ = with_lost
-    assert found.sizes["claim"] == 6
-    for name in found.claim.values:
-        np.testing.assert_array_equal(found[str(name)][:3], 0.0)
-    np.testing.assert_array_equal(found.coverage_replicates, 4)
-    np.testing.assert_allclose(found.coverage, [float(found[str(name)][3]) / 4.0 for name in found.claim.values])
-
-
-def test_what_is_lost_is_named_with_the_way_to_it(with_lost):
-    found, _ = with_lost
     for part in ("1 posteriors", "3 lost", ": 0, 1, 2 (StrangeError)", "--replicate 0 --debug"):
         assert part in found.attrs["verdict"]
 
 
-def test_what_is_lost_is_kept(with_lost, monkeypatch):
-    """A further run makes none of them again."""
+def test_what_is_kept_is_all_there_is(with_lost, monkeypatch):
+    """A second call makes nothing, also of what is lost, and finds the same, to the last digit."""
     found, folder = with_lost
     monkeypatch.setattr(module, "replicate", pytest.fail)
     assert quickly(replicates=4, settings=FEW_STEPS, out=folder).identical(found)
+    assert [path.name for path in folder.iterdir()] == [REPLICATES.file]
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(3, marks=pytest.mark.slow)])
-def test_a_failure_in_another_process_is_the_same_outcome(with_lost, monkeypatch, count):
-    """The third takes a posterior, before it fails."""
-    monkeypatch.setattr(module, "replicate", failing)
-    found = quickly(replicates=count, settings=FEW_STEPS, workers=2)
-    expected = with_lost[0].isel(replicate=slice(count))
-    for name in ("message", "traceback"):
-        assert found[name].identical(expected[name])
-    assert found.attrs["lost"] == count
+@pytest.mark.parametrize("stage", ["simulate", pytest.param("sampled", marks=pytest.mark.slow)])
+def test_an_interrupt_is_no_failure_and_loses_the_replicate(tmp_path, monkeypatch, stage):
+    """Nor half a replicate: a sampler that is interrupted gives what it has, which is no posterior to be judged."""
 
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])
-def test_an_interrupt_is_no_failure(tmp_path, monkeypatch, error):
     def interrupt(*arguments):
-        raise error
-
-    monkeypatch.setattr(making, "simulate", interrupt)
-    with pytest.raises(error):
-        quickly(out=tmp_path)
-    assert json.loads((tmp_path / REPLICATES.file).read_text())["replicates"] == []
-
-
-def test_an_interrupt_in_the_sampler_loses_the_replicate_and_not_half_of_it(tmp_path, monkeypatch):
-    """A sampler that is interrupted gives what it has, which is no posterior to be judged."""
-
-    def interrupt(state):
         raise KeyboardInterrupt
 
-    sampled = making.sampled
-    monkeypatch.setattr(making, "sampled", lambda problem, **options: sampled(problem, **options, progress=interrupt))
-    with refused(KeyboardInterrupt, "replicate 0"):
+    def interrupted(problem, **options):
+        return sampled(problem, **options, progress=interrupt)
+
+    monkeypatch.setattr(making, stage, interrupt if stage == "simulate" else interrupted)
+    with pytest.raises(KeyboardInterrupt, match="replicate 0" if stage == "sampled" else None):
         quickly(settings=FEW_STEPS, out=tmp_path)
-    assert json.loads((tmp_path / REPLICATES.file).read_text())["replicates"] == []
+    assert rows_of(tmp_path) == []
 
 
 # ---- one replicate again
@@ -285,15 +239,20 @@ def test_defaults_of_one_replicate_are_those_of_all():
 
 
 def test_more_replicates_begin_with_those_that_are_there(noted, tmp_path):
+    told = []
     whole = quickly(replicates=5)
+    assert not np.array_equal(whole["ranks"], quickly(replicates=5, rng=2)["ranks"])
     noted.clear()
-    quickly(replicates=2, out=tmp_path)
-    assert quickly(replicates=5, out=tmp_path).identical(whole)
+    for count in (2, 5):
+        found = quickly(replicates=count, out=tmp_path, workers=Workers(1, told.append))
+    assert found.identical(whole)
     assert noted == [0, 1, 2, 3, 4]
+    made = [(1, 2, 1), (2, 2, 2), (3, 5, 1), (4, 5, 2), (5, 5, 3)]
+    assert [(state.done, state.wanted, state.made) for state in told] == made
     fewer = quickly(replicates=3, out=tmp_path)
     assert fewer.sizes["replicate"] == 3
     assert len(noted) == 5
-    assert len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"]) == 5  # none is lost
+    assert len(rows_of(tmp_path)) == 5  # none is lost
 
 
 def test_a_gap_is_filled(noted, tmp_path):
@@ -306,40 +265,6 @@ def test_a_gap_is_filled(noted, tmp_path):
     assert noted == [1]
 
 
-def test_progress_is_told(noted, tmp_path):
-    told = []
-    quickly(replicates=2, out=tmp_path, workers=Workers(1, told.append))
-    quickly(replicates=4, out=tmp_path, workers=Workers(1, told.append))
-    assert [(state.done, state.wanted, state.made) for state in told] == [(1, 2, 1), (2, 2, 2), (3, 4, 1), (4, 4, 2)]
-    assert all(state.seconds >= 0.0 for state in told)
-
-
-def test_an_interrupt_keeps_what_is_done(noted, tmp_path):
-    def interrupt(state):
-        if state.done == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        quickly(replicates=9, out=tmp_path, workers=Workers(1, interrupt))
-    rows = json.loads((tmp_path / REPLICATES.file).read_text())["replicates"]
-    assert [row["number"] for row in rows] == [0, 1, 2]
-    assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
-    quickly(replicates=9, out=tmp_path)
-    assert noted == list(range(9))
-
-
-def test_what_is_done_is_noted_on_the_way(noted, tmp_path, monkeypatch):
-    """A run that is killed without a word has lost little."""
-    monkeypatch.setattr("tactile_bayes.tasks.results_store._WRITING_SHARE", 1e9)
-    there, kept = [], tmp_path / REPLICATES.file
-    quickly(
-        replicates=3,
-        out=tmp_path,
-        workers=Workers(1, lambda state: there.append(len(json.loads(kept.read_text())["replicates"]))),
-    )
-    assert there == [1, 2, 3]
-
-
 ENDLESS = """
 import sys, time
 from calibration.test_calibrate import made_up, module, quickly
@@ -348,22 +273,20 @@ def slowly(task):
     time.sleep(0.002)
     return made_up(task)
 
-module.replicate, module._NOTING = slowly, 1e9
+module.replicate = slowly
 quickly(replicates=10**5, out=sys.argv[1])
 """
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wait", [0.0, 0.1, 0.2])
-def test_a_killed_run_goes_on(tmp_path, wait):
+def test_a_killed_run_goes_on(tmp_path):
     """Whenever it is killed, what is noted is whole."""
     run = subprocess.Popen([sys.executable, "-c", ENDLESS, str(tmp_path)], cwd=Path(__file__).parents[1])
     wait_until(lambda: (tmp_path / REPLICATES.file).exists() or run.poll() is not None, seconds=60.0)
-    time.sleep(wait)
+    time.sleep(0.2)
     run.kill()
     run.wait()
-    done = len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"])
-    told = []
+    done, told = len(rows_of(tmp_path)), []
     found = quickly(replicates=done, out=tmp_path, workers=Workers(1, told.append))
     assert found.sizes["replicate"] == done > 0
     assert told == []
@@ -404,71 +327,51 @@ def test_another_calibration_is_left_alone(noted, tmp_path, other, differs):
         {"rng": np.int64(1)},
         {"drive": [Rotation(drive_angles=ANGLES[::-1])]},
         {"truth": Misspecification(base_shift=[0.0, 0.0])},
-        {"rig": Rig(unknown=NOTHING)},
         {"truth": AS_STATED},
+        {"rig": Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown=NOTHING)},
         {"settings": replace(BY_DEFAULT, ensembles=np.int64(2))},
     ],
     ids=lambda same: next(iter(same)),
 )
-def test_the_same_in_other_words_is_the_same(noted, tmp_path, same):
-    quickly(out=tmp_path)
-    quickly(out=tmp_path, **same)
-
-
-def test_what_an_experiment_is_follows_from_its_words():
-    """Defaults and the same written out."""
-    words = experiment_of(rig=AS_STATED, rng=1).identity
-    written_out = {
-        "family": Family("parabola"),
-        "rig": Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown="nothing"),
-        "drive": [Rotation((0, 0))],
-        "settings": SamplerSettings(
-            ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500
-        ),
-        "truth": Misspecification(),
-    }
-    assert experiment_of(rng=1, **written_out).identity == words
+def test_the_same_in_other_words_is_the_same(same):
+    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "rng": 1}
+    words = experiment_of(**asked).identity
+    assert experiment_of(**(asked | same)).identity == words
     assert all(isinstance(said, str) for said in words.values())
+
+
+def test_defaults_may_be_written_out():
+    written_out = {"drive": [Rotation((0, 0))], "settings": BY_DEFAULT, "truth": Misspecification()}
+    found = experiment_of("parabola", AS_STATED, rng=1, **written_out).identity
+    assert found == experiment_of(rig=AS_STATED, rng=1).identity
 
 
 # ---- what is refused
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        {"replicates": 0},
-        {"rng": -1},
-        {"workers": 0},
-        {"drive": "all"},
-        {"drive": []},
-        {"rig": "good"},
-        {"settings": "quick"},
-        {"truth": "real"},
-    ],
-    ids=lambda wrong: next(iter(wrong)),
-)
-def test_bad_arguments_are_told(noted, tmp_path, wrong):
-    """Before there is a folder."""
-    out = tmp_path / "out"
-    with refused(ParameterError, **wrong):
-        quickly(**({"out": None if "workers" in wrong else out} | wrong))
-    assert not out.exists()
-    assert noted == []
-
-
-@pytest.mark.parametrize(
     ("wrong", "named"),
     [
+        ({"replicates": 0}, ["replicates", "0"]),
+        ({"rng": -1}, ["rng", "-1"]),
+        ({"workers": 0}, ["workers", "0"]),
+        ({"drive": "all"}, ["drive", "'all'"]),
+        ({"drive": []}, ["drive", "[]"]),
+        ({"rig": "good"}, ["rig", "'good'"]),
+        ({"settings": "quick"}, ["settings", "'quick'"]),
+        ({"truth": "real"}, ["truth", "'real'"]),
         ({"family": "cube"}, ["'cube'", "parabola"]),
         ({"drive": Rotation(drive_angles=[0.0, 1.0])}, ["drive_angles", "3"]),
         ({"rig": Rig(load_cell=LoadCell())}, ["load cell", "noise"]),
         ({"truth": Rig(load_cell=LoadCell())}, ["load cell", "truth", "noise"]),
     ],
+    ids=str,
 )
-def test_what_does_not_go_together_is_told(noted, wrong, named):
+def test_bad_arguments_are_refused_before_there_is_a_folder(noted, tmp_path, wrong, named):
+    out = tmp_path / "out"
     with refused(ParameterError, *named):
-        quickly(**wrong)
+        quickly(**({"out": None if "workers" in wrong else out} | wrong))
+    assert not out.exists()
     assert noted == []
 
 

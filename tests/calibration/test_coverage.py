@@ -71,10 +71,3 @@ def test_what_no_number_of_successes_shows_is_noticed_by_none():
     assert 0.3 < below < 0.6
     assert np.isnan(above)
     assert np.isnan(noticed_coverage(3, 0.5, LEVEL, POWER, is_whole=True)).all()
-
-
-def test_more_replicates_notice_less():
-    counts = (50, 100, 200, 400, 1000)
-    noticed = np.array([noticed_coverage(count, 0.9, LEVEL, POWER, is_whole=True) for count in counts])
-    assert np.all(np.diff(noticed[:, 0]) > 0.0)
-    assert np.all(np.diff(noticed[1:, 1]) < 0.0)

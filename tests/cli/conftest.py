@@ -13,6 +13,15 @@ def record(measured, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def bare(record):
+    """The same without header."""
+    path = record.with_name("bare.csv")
+    lines = record.read_text(encoding="utf-8").splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if not line.startswith("#")), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="session")
 def as_stated(tmp_path_factory):
     """A rig of which nothing is unknown."""
     path = tmp_path_factory.mktemp("as stated") / "rig.toml"

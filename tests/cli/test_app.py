@@ -8,11 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 import typer
 
-from helpers.commands import assert_misused, assert_refused, call, plain
+from helpers.commands import call
 from helpers.interrupts import interrupted_while_sampling
 from helpers.report_pages import FEW
 from tactile_bayes import __version__, read_record
@@ -25,13 +24,10 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.runs import contour as contour_run
-from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 
 HEAVY = {"scipy", "xarray", "matplotlib", "emcee", "numpy", "arviz_stats"}
 # In the order in which a record goes through them.
 COMMANDS = ["scan", "measure", "rig", "inspect", "reconstruct", "infer", "compare", "calibrate", "sensitivity"]
-ROD_OPTIONS = ["--length", str(ROD.length), "--flexural-rigidity", repr(ROD.flexural_rigidity)]
-CELL_OPTIONS = ["--force-noise", str(LOAD_CELL.force_noise), "--moment-noise", str(LOAD_CELL.moment_noise)]
 
 
 def start(*arguments, code=0, cwd=None):
@@ -44,15 +40,6 @@ def start(*arguments, code=0, cwd=None):
 
 
 @pytest.fixture(scope="session")
-def bare(record):
-    """The same without header."""
-    path = record.with_name("bare.csv")
-    lines = record.read_text(encoding="utf-8").splitlines()
-    path.write_text("\n".join(line for line in lines if not line.startswith("#")) + "\n", encoding="utf-8")
-    return path
-
-
-@pytest.fixture(scope="session")
 def posterior(record):
     """What that record is taken for, after few steps."""
     return infer_contour(read_record(record), rig=Rig(unknown="nothing"), rng=1, settings=FEW)
@@ -60,18 +47,15 @@ def posterior(record):
 
 @pytest.fixture
 def at_once(monkeypatch, posterior):
-    """Runs without figures to which the posterior is given; the records that it should have come from."""
-    given = []
+    """Runs without figures to which the posterior is given."""
 
     def found(measured, *, progress=None, **options):
-        given.append(measured)
         if progress is not None:
             progress(Progress(steps=50, max_steps=100, r_hat=1.02, ess=300.0, seconds=1.0))
         return posterior.copy(deep=True)
 
     monkeypatch.setattr(contour_run, "infer_contour", found)
     monkeypatch.setattr(contour_run, "_draw", lambda *arguments, **options: {})
-    return given
 
 
 # --- Help and imports -----------------------------------------------------------------------------------------------
@@ -86,12 +70,25 @@ def test_help_lists_the_commands():
     assert {"demo", "dataset"} <= set(found)
 
 
-@pytest.mark.parametrize(
-    "command", [*COMMANDS, "demo", *(f"dataset {name}" for name in ("generate", "verify", "record"))]
-)
-def test_every_command_has_an_example_can_be_quiet_and_answers_in_json(command):
-    shown = call(*command.split(), "--help").stdout
-    assert all(words in shown for words in (f"Example: tactile-bayes {command} ", "--quiet", "--json"))
+def commands_of(group, prefix=""):
+    """Each command with its name, those of groups in groups too."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands_of(command, f"{name} ")
+        else:
+            yield prefix + name, command
+
+
+ALL = dict(commands_of(typer.main.get_command(app)))
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_command_has_an_example_at_most_14_options_can_be_quiet_and_answers_in_json(name):
+    shown = call(*name.split(), "--help").stdout
+    words = (f"Example: tactile-bayes {name} ", *(() if name == "dataset example" else ("--quiet", "--json")))
+    assert [each for each in words if each not in shown] == []
+    options = [each for each in ALL[name].params if each.param_type_name == "option" and each.name != "help"]
+    assert len(options) <= 14
 
 
 def test_help_states_the_exit_codes():
@@ -103,7 +100,16 @@ def test_version():
     assert start("--version") == (f"{__version__}\n", "")
 
 
-@pytest.mark.parametrize("code", ["import tactile_bayes", "from tactile_bayes.cli import app; app(['--help'])"])
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import tactile_bayes",
+        *(
+            f"from tactile_bayes.cli import app; app({words})"
+            for words in (["--help"], ["dataset", "generate", "--help"], ["dataset", "example"])
+        ),
+    ],
+)
 def test_what_is_heavy_is_loaded_when_used(code):
     """Importing the package and asking for help are quick because of what they do not import."""
     script = f"import atexit, sys\natexit.register(lambda: print(sorted({HEAVY} & set(sys.modules))))\n{code}"
@@ -113,20 +119,6 @@ def test_what_is_heavy_is_loaded_when_used(code):
 
 
 # --- Results --------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_a_record_too_short_of_time_is_said_not_to_have_converged(record, tmp_path):
-    """As a stranger starts it, figures and all."""
-    out, errors = start("infer", record, "--out", "run", "--max-seconds", 1, "--quiet", cwd=tmp_path)
-    assert errors == ""
-    assert re.match(r"NOT CONVERGED, .*time allowed", out)
-    assert out.lower().count("not converged") == 1
-    assert "\nSamples: " in out
-    for name in ("a", "q", "x_c", "noise_scale", "gap width"):
-        assert f"\n{name} " in out
-    for line in out.split("\n\n")[-1].splitlines():
-        assert (tmp_path / line.split()[-1]).stat().st_size > 0
 
 
 @pytest.mark.usefixtures("quick")
@@ -146,7 +138,13 @@ def test_an_answer_in_json_is_one_object_and_says_whether_it_is_to_be_trusted(re
 
 
 @pytest.mark.usefixtures("at_once")
-def test_a_demonstration_in_json_has_the_truth_beside_it(tmp_path):
+def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
+    result = call("demo", "--out", tmp_path / "demo")
+    assert result.exit_code == 0, result.output
+    assert "\ntactile-bayes infer RECORD --rig rig.toml --out RUN\n" in result.stdout
+    assert "truth" in result.stdout
+    assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
+    assert Rig.read(tmp_path / "demo" / "rig.toml").entries == dict(NOTHING)
     answer = json.loads(call("demo", "--out", tmp_path / "demo", "--json").stdout)
     assert {row["quantity"]: row["truth"] for row in answer["quantities"]}["a"] == 2.5
     assert answer["files"]["record"] == str(tmp_path / "demo" / "record.csv")
@@ -161,9 +159,10 @@ def test_what_is_wrong_with_the_record_is_the_first_line(posterior, record, tmp_
     result = call("infer", record, "--out", tmp_path / "run", "--quiet")
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("Forces reach ")
-    assert result.stdout.split("\n\n")[0] == "\n".join(
-        (tmp_path / "run" / "summary.txt").read_text(encoding="utf-8").split("\n\n")[0].splitlines()
-    )
+    summary = (tmp_path / "run" / "summary.txt").read_text(encoding="utf-8")
+    assert result.stdout.split("\n\n")[0] == summary.split("\n\n")[0]
+    for word in ("Samples:", "a", "q", "x_c", "noise_scale", "gap width"):
+        assert f"\n{word} " in result.stdout
 
 
 @pytest.mark.usefixtures("at_once")
@@ -186,42 +185,6 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
     assert "band" not in answer["files"]
     assert traced.stderr.startswith("Traceback (most recent call last):")
     assert "in broken" in traced.stderr
-
-
-@pytest.mark.usefixtures("quick")
-def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
-    result = call("demo", "--out", tmp_path / "demo")
-    assert result.exit_code == 0, result.output
-    assert "\ntactile-bayes infer RECORD --rig rig.toml --out RUN\n" in result.stdout
-    assert "truth" in result.stdout
-    assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
-    assert Rig.read(tmp_path / "demo" / "rig.toml").entries == dict(NOTHING)
-
-
-@pytest.mark.filterwarnings("ignore:.*no unit is stated")
-def test_a_rig_tells_its_names_units_signs_and_sweeps_by_its_file(at_once, bare, rig_file, tmp_path):
-    names, *rows = (line.split(",") for line in bare.read_text(encoding="utf-8").splitlines())
-    place = names.index
-    table = [["Winkel", "Mz [mN m]", "Fx", "Fy"]]
-    for row in rows:
-        angle, moment, x, y = (float(row[place(name)]) for name in names[-4:])
-        table.append([repr(90 - math.degrees(angle)), repr(1e3 * moment), repr(-1e3 * x), repr(y)])
-    path = tmp_path / "rig.csv"
-    path.write_text("\n".join([*map(";".join, table), ""]).replace(".", ","), encoding="utf-8")
-    columns = {"drive_angle": "90-Winkel[deg]", "holding_moment": "Mz", "force_x": "-1e-3*Fx[N]", "force_y": "Fy[N]"}
-    file = rig_file("[file]\nsplit_sweeps = true\n" + "".join(f'{name} = "{of}"\n' for name, of in columns.items()))
-    told = call("infer", path, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, *CELL_OPTIONS, "--rig", file)
-    assert told.exit_code == 0, told.output
-    plain = call("infer", bare, "--out", tmp_path / "1", "-q", *ROD_OPTIONS, *CELL_OPTIONS)
-    assert told.stdout.split("\n\n")[:2] == plain.stdout.split("\n\n")[:2]
-    rig, usual = at_once
-    assert set(rig.data_vars) == set(usual.data_vars)
-    for name in usual.data_vars:
-        if usual[name].dtype.kind == "f":
-            np.testing.assert_allclose(rig[name], usual[name], rtol=1e-9, atol=1e-12, err_msg=name)
-        else:
-            np.testing.assert_array_equal(rig[name], usual[name], err_msg=name)
-    assert rig.attrs == usual.attrs
 
 
 @pytest.mark.usefixtures("at_once")
@@ -247,68 +210,7 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
     assert "No contact points" in result.stdout
 
 
-# --- Refusals -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--length", "0.1"], "--length and --flexural-rigidity"),
-        (["--rig", __file__], "not TOML"),
-        (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
-        (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity"),
-        (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity"),
-        (["--length", "-1", "--flexural-rigidity", "1"], "length is -1.0"),
-        (["--length", "0.3", "--flexural-rigidity", "1"], "Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0)"),
-        (["--family", "blob"], "no family 'blob'"),
-        (["--probability", "1"], "probability is 1.0"),
-        (["--force-noise", "-1"], "force_noise is -1.0"),
-    ],
-)
-def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
-    assert_refused(call("infer", record, "--out", tmp_path, *options), message)
-
-
-@pytest.mark.parametrize(
-    ("entry", "message"),
-    [
-        ('missing = ["force_z"]', "'force_z' is no channel"),
-        ('missing = ["force_x"]', "column 'force_x' has values"),
-        ('force = "Fx"', "no key 'file.force': did you mean 'force_"),
-        ('force_x = "Fx[mN]"', "no column 'Fx', which is given for 'force_x' (columns: sweep, "),
-        ('force_x = "force_x[mm]"', "column 'force_x' is in [N], but [mm]"),
-        ("split_sweeps = true", "column 'sweep' is there already: do without split_sweeps"),
-    ],
-)
-@pytest.mark.parametrize("command", ["infer", "inspect", "reconstruct"])
-def test_a_rigs_file_that_does_not_fit_the_record_is_refused_in_a_line(
-    record, tmp_path, rig_file, command, entry, message
-):
-    options = ("--rig", rig_file(f"[file]\n{entry}\n"), "--out", tmp_path / "out")
-    assert_refused(call(command, record, *options), message)
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT]"),
-        (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice"),
-        (["--column", "force=Fx"], "'force' is no column of a record: did you mean 'force_"),
-        (["--missing", "force_z"], "'force_z' is no channel"),
-        (["--split-sweeps"], "column 'sweep' is there already"),
-    ],
-)
-def test_options_of_an_inspection_that_do_not_fit_are_refused(record, options, message):
-    assert_refused(call("inspect", record, *options), message)
-
-
-@pytest.mark.filterwarnings("ignore:.*no unit is stated")
-@pytest.mark.parametrize(
-    ("option", "named"), [("force", ("holding_moment", "--moment-noise")), ("moment", ("force_x", "--force-noise"))]
-)
-def test_half_a_noise_is_refused_where_nobody_states_the_other(bare, tmp_path, option, named):
-    assert_refused(call("infer", bare, *ROD_OPTIONS, f"--{option}-noise", 0.1, "--out", tmp_path), *named)
+# --- Options, errors, warnings --------------------------------------------------------------------------------------
 
 
 @pytest.mark.filterwarnings("ignore:.*no unit is stated")
@@ -330,59 +232,6 @@ def test_an_option_replaces_one_number_of_the_rigs_file(bare, rig_file, tmp_path
     assert rod == rig.rod == Rod(0.2, 1e-3, taper=0.2)
     assert (rig.load_cell.force_noise, rig.load_cell.moment_noise) == (0.3, 0.2)
     assert rig.known == {"friction": 0.1}
-
-
-def test_no_command_has_more_than_14_options():
-    def counts(group, prefix=""):
-        for name, command in group.commands.items():
-            if hasattr(command, "commands"):
-                yield from counts(command, f"{name} ")
-            else:
-                options = [each for each in command.params if each.param_type_name == "option" and each.name != "help"]
-                yield prefix + name, len(options)
-
-    found = dict(counts(typer.main.get_command(app)))
-    assert set(COMMANDS) <= set(found)
-    assert {name: count for name, count in found.items() if count > 14} == {}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["infer", "record.csv", "--out", "run", "--famly", "circle"], "No such option: --famly"),
-        (["infer", "record.csv", "--out", "run", "--max-seconds", "many"], "--max-seconds"),
-        (["infer", "record.csv", "--out", "run", "--nuisance", "bias"], "No such option: --nuisance"),
-        (["infer", "record.csv", "--out", "run", "--seed", "-1"], "--seed"),
-        (["infer", "record.csv"], "Missing option '--out'"),
-        (["infer", "--out", "run"], "Missing argument 'record'"),
-        (["infer", "record.csv", "--out", __file__], "is a file"),
-        (["sing"], "No such command 'sing'"),
-        (["--quiet"], "No such option: --quiet"),
-    ],
-)
-def test_a_call_that_is_none_is_refused_with_the_usage(arguments, message):
-    assert_misused(call(*arguments), message)
-
-
-@pytest.mark.parametrize("name", ["nowhere.csv", "nowhere.nc", "nowhere"])
-def test_a_file_that_is_not_there(tmp_path, name):
-    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), f"{tmp_path / name}: No such file or directory")
-
-
-@pytest.mark.parametrize("name", ["a.csv", "a.nc", "a"])
-def test_a_directory_for_a_record(tmp_path, name):
-    (tmp_path / name).mkdir()
-    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), tmp_path / name, "holds no record")
-
-
-def test_a_folder_that_cannot_be_made(record):
-    assert_refused(call("infer", record, "--out", Path(__file__) / "run"), "Not a directory")
-    assert_refused(call("demo", "--quiet", "--out", Path(__file__) / "run"), "Not a directory")
-
-
-def test_misuse_of_the_command_itself():
-    _, errors = start("infer", "nowhere.csv", "--famly", "circle", code=2)
-    assert plain("No such option: --famly") in plain(errors)
 
 
 def test_a_refusal_shows_where_it_comes_from_if_asked(tmp_path):

@@ -1,15 +1,11 @@
 """The command `compare`: what it prints, writes and refuses."""
 
-import re
-import sys
-
 import pandas as pd
 import pytest
 import xarray as xr
 
-from helpers.commands import assert_misused, assert_refused, call
+from helpers.commands import call
 from helpers.comparisons import NAMES, made_up
-from helpers.interrupts import interrupted_while_sampling
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.runs import comparison as comparison_run
 
@@ -28,18 +24,14 @@ def compared(record, as_stated, tmp_path_factory, coarse_pictures):
 
 @pytest.fixture
 def instead(monkeypatch):
-    """Have a comparison made up in place of one that is computed; what it was asked for is noted."""
+    """Have a comparison made up in place of one that is computed."""
 
     def put(comparison, *, before=lambda progress: None):
-        asked = {}
-
         def compare_families(measured, *, progress, **options):
-            asked.update(options)
             before(progress)
             return comparison
 
         monkeypatch.setattr(comparison_run, "compare_families", compare_families)
-        return asked
 
     return put
 
@@ -65,10 +57,6 @@ def test_the_verdict_comes_first_then_the_table_then_the_files(compared):
     listed = result.stdout.split("\n\n")[-1].splitlines()
     assert {line.split(maxsplit=1)[1] for line in listed} == {str(folder / name) for name in FILES}
     assert {path.name for path in folder.iterdir()} == FILES
-
-
-def test_the_files_hold_the_comparison(compared):
-    result, folder = compared
     stored = xr.load_dataset(folder / "comparison.nc", engine="h5netcdf")
     assert stored.attrs["verdict"] == result.stdout.splitlines()[0]
     assert stored.fits.dtype == bool
@@ -105,9 +93,6 @@ def test_the_table_says_how_samples_are_predicted(instead, record, tmp_path, mon
         "ellipse": "<0.001 -108.1 -9.0 ± 3.0 0 0.001 no",
     }
     assert "(Pareto k̂ above 0.7) for circle, ellipse\n" in result.stdout
-
-
-def test_that_none_fits_is_the_first_line(instead, record, tmp_path):
     instead(made_up([0.4, 0.6], fits=False))
     assert call("compare", record, "--out", tmp_path).stdout.startswith("None fits: ")
 
@@ -121,42 +106,12 @@ def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
     assert "effective draws" not in result.stdout
 
 
-# --- Refusals -------------------------------------------------------------------------------------------------------
+def test_control_c_ends_all_of_it(instead, record, tmp_path):
+    def interrupted(progress):
+        raise KeyboardInterrupt("interrupted over shape-free")
 
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--family", "circle"], "families are circle"),
-        (["--family", "circle", "--family", "blob"], "no family 'blob'"),
-        (["--max-seconds", "0"], "max_seconds is 0.0"),
-        (["--out", __file__ + "/run"], "Not a directory"),
-    ],
-)
-def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
-    assert_refused(call("compare", record, "--out", tmp_path / "shapes", *options), message)
-    assert not (tmp_path / "shapes").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ([], "Missing option '--out'"),
-        (["--out", __file__], "is a file"),
-    ],
-)
-def test_a_call_that_is_none_is_refused_with_the_usage(options, message):
-    assert_misused(call("compare", "record.csv", *options), message)
-
-
-# --- Interrupts -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
-def test_control_c_while_sampling_ends_all_of_it(record, tmp_path):
-    code, out, errors = interrupted_while_sampling("compare", record, tmp_path)
-    assert code == 130
-    assert re.fullmatch("tactile-bayes: interrupted .*shape-free: .*\n", errors)
-    assert set(out.splitlines()) <= {"sampling"}
-    assert list((tmp_path / "run").iterdir()) == []
+    instead(made_up([0.4, 0.6]), before=interrupted)
+    result = call("compare", record, "--out", tmp_path)
+    assert (result.exit_code, result.stdout) == (130, "")
+    assert result.stderr == "tactile-bayes: interrupted over shape-free\n"
+    assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,6 @@ import sys
 import time
 import tomllib
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,13 +16,10 @@ import xarray as xr
 import tactile_bayes as tb
 from helpers import commands
 from helpers.commands import assert_refused
-from helpers.tasks import alive, wait_until
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.datasets.specification_text import left_out
 from tactile_bayes.record import LOAD_CELL_UNITS
 
-COMMAND = str(Path(sys.executable).with_name("tactile-bayes"))
-HEAVY = {"numpy", "scipy", "xarray", "rich.progress"}
 SMALL = """
 name = "small"
 records = 6
@@ -64,18 +60,6 @@ def small(tmp_path_factory):
     return folder / "set", result
 
 
-# --- Help -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("arguments", [["generate", "--help"], ["example"]])
-def test_what_is_heavy_is_loaded_when_used(arguments):
-    code = "import atexit, sys\nfrom tactile_bayes.cli import app\n"
-    code += f"atexit.register(lambda: print(sorted({HEAVY} & set(sys.modules))))\napp(['dataset', *{arguments}])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == "[]"
-
-
 # --- The example ----------------------------------------------------------------------------------------------------
 
 
@@ -110,21 +94,16 @@ def test_the_example_is_a_specification_with_every_law(example):
     assert spec.units == "dimensionless"
 
 
-def test_every_option_of_the_example_is_taken(example):
+def test_every_option_of_the_example_is_taken_and_shown_with_what_it_is_when_left_out(example):
+    whole = tb.datasets.read_specification(tomllib.loads(example))
+    fields = ("shard_records", "single", "each_group", "bases", "directions", "drive", "groups", "frame")
     taken = list(options_taken(example))
     assert len(taken) > 20
     for line, text in taken:
         spec = tb.datasets.read_specification(tomllib.loads(text))
         assert tomllib.loads(text) != tomllib.loads(example), line
         assert spec.units == ("SI" if line == "#[rod]" else "dimensionless")
-
-
-def test_options_are_shown_with_what_they_are_when_left_out(example):
-    whole = tb.datasets.read_specification(tomllib.loads(example))
-    fields = ("shard_records", "single", "each_group", "bases", "directions", "drive", "groups", "frame")
-    for line, text in options_taken(example):
         if re.match(r"#(shard_records|precision|each_contour|bases|directions|margin|weight|frame)\b", line):
-            spec = tb.datasets.read_specification(tomllib.loads(text))
             assert all(getattr(spec, name) == getattr(whole, name) for name in fields), line
 
 
@@ -153,30 +132,16 @@ def test_the_example_is_made_and_measured(example, tmp_path):
 # --- Generate -------------------------------------------------------------------------------------------------------
 
 
-def test_what_was_made_is_said_in_three_lines(small):
+def test_what_was_made_is_said_in_three_lines_and_not_made_again(small):
     folder, result = small
     assert result.stderr == ""
     first, *rest = result.stdout.splitlines()
     assert re.fullmatch(r"6 records in 3 files, 0\.\d MB: 6 made .* \S+ s, [\d,]+ .*/s", first)
     assert rest[-1] == f"{folder / 'README.md'} describes the files"
     assert len(list(folder.glob("shard-*.nc"))) == 3
-
-
-def test_what_is_there_is_not_made_again(small, tmp_path):
-    folder, _ = small
     result = call("generate", folder.parent / "small.toml", "--out", folder)
     assert result.exit_code == 0
     assert re.search(r"existed already.* dataset verify ", result.stdout.splitlines()[0])
-
-
-def test_contours_that_were_drawn_again_are_counted(specification, tmp_path):
-    specification.write_text(SMALL.replace("[0.3, 0.7]", "[0.3, 1.5]"), encoding="utf-8")
-    result = call("generate", specification, "--out", tmp_path / "set", "--workers", 1)
-    assert result.exit_code == 0, result.output
-    line = result.stdout.splitlines()[1]
-    redrawn = json.loads((tmp_path / "set" / "manifest.json").read_text())["redrawn"]
-    total = sum(redrawn.values())
-    assert re.fullmatch(rf"{total} contours .*again: .*\d+ out of reach.*", line)
 
 
 def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification, tmp_path, monkeypatch):
@@ -192,30 +157,27 @@ def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("words", "change", "named"),
     [
-        (("a = ", "b = "), "no key 'contours[0].b'"),
-        (("[0.3, 0.7]", "[1.3, 1.7]"), "drawn 1000 times"),
-        (("[scan]", "[scan"), "small.toml: not TOML"),
+        ("generate {spec} --out {new}", ("a = ", "b = "), ["no key 'contours[0].b'"]),
+        ("generate {spec} --out {new} --workers 1", ("[0.3, 0.7]", "[1.3, 1.7]"), ["drawn 1000 times"]),
+        ("generate {spec} --out {new}", ("[scan]", "[scan"), ["small.toml: not TOML"]),
+        ("generate {spec} --out {set}", ("seed = 1", "seed = 2"), ["set", "another specification"]),
+        ("generate {new}/nowhere.toml --out {new}", None, ["nowhere.toml: No such file or directory"]),
+        *((f"generate {{spec}} --out {{new}} --workers {few}", None, [f"is '{few}'"]) for few in ("many", "0", "-1")),
+        ("verify {folder}", None, ["holds no data set", "manifest.json"]),
+        ("record {set} 6 --out {new}/record.csv", None, ["no record 6", "0 to 5"]),
+        ("record {set} 0 --out {new}/record.txt", None, ["record.txt", ".csv", ".nc"]),
+        ("record {folder} 0 --out {new}/record.csv", None, ["holds no data set"]),
+        ("record {new}/nowhere 0 --out {new}/record.csv", None, ["nowhere: No such file or directory"]),
     ],
 )
-def test_an_impossible_specification_is_refused_in_a_line(specification, tmp_path, change, message):
-    text = SMALL.replace(*change)
-    assert text != SMALL
-    specification.write_text(text, encoding="utf-8")
-    assert_refused(call("generate", specification, "--out", tmp_path / "set", "--workers", 1), message)
-
-
-def test_other_refusals_of_generate(small, specification, tmp_path):
-    folder, _ = small
-    specification.write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
-    assert_refused(call("generate", specification, "--out", folder), folder, "another specification")
-    nowhere = tmp_path / "nowhere.toml"
-    assert_refused(call("generate", nowhere, "--out", tmp_path), f"{nowhere}: No such file or directory")
-    for wrong in ("many", "0", "-1"):
-        assert_refused(
-            call("generate", specification, "--out", tmp_path, "--workers", wrong), f"--workers is '{wrong}'"
-        )
+def test_what_cannot_be_is_refused_in_a_line(small, specification, tmp_path, words, change, named):
+    if change is not None:
+        assert change[0] in SMALL
+        specification.write_text(SMALL.replace(*change), encoding="utf-8")
+    places = {"spec": specification, "set": small[0], "folder": tmp_path, "new": tmp_path / "new"}
+    assert_refused(call(*words.format(**places).split()), *named)
 
 
 SLOW = """
@@ -237,19 +199,17 @@ main()
 """
 
 
-STOPS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
-@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+@pytest.mark.usefixtures("specification")
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("shard", "suppressed"), [(2, "ValueError"), pytest.param(1, "KeyboardInterrupt", marks=pytest.mark.slow)]
+    ("shard", "suppressed", "sent", "code", "word"),
+    [(2, "ValueError", signal.SIGINT, 130, "interrupted"), (1, "KeyboardInterrupt", signal.SIGTERM, 143, "terminated")],
 )
 def test_control_c_says_how_to_go_on_and_the_same_command_does(
-    specification, tmp_path, monkeypatch, shard, suppressed, sent
+    tmp_path, monkeypatch, shard, suppressed, sent, code, word
 ):
     """At once, or after the shard if the interrupt was lost; so does a batch system's SIGTERM."""
-    code, word = STOPS[sent]
     slow = SLOW.format(shard=shard, suppressed=suppressed)
     arguments = ["dataset", "generate", "small.toml", "--out", "set", "--workers", "1"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path}
@@ -267,34 +227,18 @@ def test_control_c_says_how_to_go_on_and_the_same_command_does(
     assert tb.datasets.verify(tmp_path / "set").records == 6
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
-def test_workers_end_when_it_is_terminated(specification, tmp_path):
-    """In the middle of their work, of which there are hours."""
-    specification.write_text(SMALL.replace("records = 6", "records = 600000").replace("= 2\n", "= 2000\n", 1))
-    arguments = ["dataset", "generate", "small.toml", "--out", "set", "--workers", "2"]
-    with subprocess.Popen([COMMAND, *arguments], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        wait_until(lambda: len(children.read_text().split()) >= 3)  # two, and the tracker of resources
-        team = children.read_text().split()
-        process.send_signal(signal.SIGTERM)
-        _, errors = process.communicate(timeout=60)
-    assert process.returncode == 143
-    assert re.fullmatch("tactile-bayes: terminated, no further .*\n", errors)
-    wait_until(lambda: not any(map(alive, team)), seconds=5.0)
-
-
-def test_rods_that_are_strained_and_sweeps_without_contact_are_told(specification, tmp_path):
+def test_what_was_drawn_again_strained_or_without_contact_is_counted(specification, tmp_path):
     rod = "\n[rod]\nlength = 1.0\nflexural_rigidity = 1.0\ndiameter = 0.2\n"
     text = SMALL.replace("samples = 20", "samples = 20\nfrom_degrees = 170\nto_degrees = 175") + rod
-    specification.write_text(text, encoding="utf-8")
+    specification.write_text(text.replace("[0.3, 0.7]", "[0.3, 1.5]"), encoding="utf-8")
     result = call("generate", specification, "--out", tmp_path / "set", "--workers", 1)
     assert result.exit_code == 0, result.output
     stated = json.loads((tmp_path / "set" / "manifest.json").read_text())
-    assert stated["strained"] > 1
-    assert stated["untouched"] > 1
-    assert re.search(rf"\n{stated['strained']} records .*strained", result.stdout)
-    assert re.search(rf"\n{stated['untouched']} sweeps without .*contact\n", result.stdout)
+    again, strained, untouched = sum(stated["redrawn"].values()), stated["strained"], stated["untouched"]
+    assert min(again, strained, untouched) > 0
+    assert re.search(rf"\n{again} contours .*again: .*\d+ out of reach", result.stdout)
+    assert re.search(rf"\n{strained} records .*strained", result.stdout)
+    assert re.search(rf"\n{untouched} sweeps without .*contact\n", result.stdout)
 
 
 # --- Verify ---------------------------------------------------------------------------------------------------------
@@ -309,16 +253,6 @@ def test_a_whole_data_set_is_verified(small):
     assert again.startswith("3 files made again")
 
 
-def test_a_byte_that_differs_is_found(specification, tmp_path):
-    assert call("generate", specification, "--out", tmp_path / "set", "--workers", 1).exit_code == 0
-    shard = tmp_path / "set" / "shard-000001.nc"
-    content = bytearray(shard.read_bytes())
-    content[-100] ^= 1
-    shard.write_bytes(content)
-    assert_refused(call("verify", tmp_path / "set"), shard, "not as it was")
-    assert_refused(call("verify", tmp_path), f"{tmp_path} holds no data set", "manifest.json")
-
-
 # --- Record ---------------------------------------------------------------------------------------------------------
 
 
@@ -329,24 +263,5 @@ def test_a_record_is_written_as_infer_takes_it(small, tmp_path, source, suffix):
     result = call("record", folder.with_name(source), 3, "--out", path)
     assert result.stdout == f"record 3 of {folder.with_name(source)}, 40 samples: {path}\n"
     xr.testing.assert_equal(tb.read_record(path), tb.datasets.record(folder, 3))
-
-
-def test_a_record_without_truth_is_what_a_laboratory_has(small, tmp_path):
-    folder, _ = small
-    path = tmp_path / "record.csv"
     assert call("record", folder, 0, "--out", path, "--no-truth").exit_code == 0
-    assert "truth" not in path.read_text(encoding="utf-8")
-    measured = tb.read_record(path)
-    assert measured.attrs["load_cell_force_noise"] == 0.05
-    whole = tb.datasets.record(folder, 0)
-    np.testing.assert_array_equal(measured.holding_moment, whole.holding_moment)
-    assert np.max(np.abs(whole.holding_moment - whole.truth_holding_moment)) > 0.02
-
-
-def test_refusals_of_record(small, tmp_path):
-    folder, _ = small
-    out = ("--out", tmp_path / "record.csv")
-    assert_refused(call("record", folder, 6, *out), "no record 6", "0 to 5")
-    assert_refused(call("record", folder, 0, "--out", tmp_path / "record.txt"), "record.txt", ".csv", ".nc")
-    assert_refused(call("record", tmp_path, 0, *out), "holds no data set")
-    assert_refused(call("record", tmp_path / "nowhere", 0, *out), "nowhere: No such file or directory")
+    xr.testing.assert_equal(tb.read_record(path), tb.datasets.record(folder, 0, truth=False))

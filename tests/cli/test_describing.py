@@ -2,9 +2,7 @@
 
 import json
 
-import pytest
-
-from helpers.commands import assert_refused, call
+from helpers.commands import call
 from tactile_bayes.rig.parameters import PARAMETERS, STANDARD, members
 
 SHEET = """
@@ -52,21 +50,3 @@ def test_a_file_is_said_in_words(rig_file):
     words = call("rig", path).stdout
     for part in ("L = 0.2 m, EI = 0.0024 N m²", "force_noise = 0.003", "force_x = -1e-3*Fx[N]", "turns of the drive"):
         assert part in words
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[unknown]\nlevr = 0.0\n", "did you mean 'lever'?"),
-        ("[rod]\nlength = 0.2\n", "length and flexural_rigidity"),
-        ('[load_cell]\nforce_noise = "3 mm"\n', "'3 mm'"),
-        ("[rod", "not TOML"),
-    ],
-)
-def test_a_file_that_is_wrong_is_refused(rig_file, text, words):
-    assert_refused(call("rig", rig_file(text)), words)
-
-
-def test_a_file_or_the_list_is_asked_for(rig_file):
-    for asked in ([], [rig_file(SHEET), "--parameters"]):
-        assert_refused(call("rig", *asked), "file of a rig", "--parameters")

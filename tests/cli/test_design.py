@@ -48,36 +48,15 @@ def test_drives_that_carry_the_base_are_candidates(run, tmp_path):
     result = run("--carry", "0.8,0,180,65,1.6", "--carry", poses, "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output
     candidates = json.loads(result.stdout)["candidates"]
+    assert json.loads(result.stdout)["words"][0].startswith("Put the pivot")
     assert [one["is_pivot"] for one in candidates] == [True, True, False, False]
+    assert candidates[0]["nested_width"] is None
     assert candidates[3]["drive"] == "carried from (0.8, 0) to (-0.8, 0) at 65° to 115°"
     assert candidates[0]["samples"] > candidates[2]["samples"] > 20
     with (tmp_path / "candidates.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["drive"] for row in rows] == [one["drive"] for one in candidates]
     np.testing.assert_allclose([float(row["width"]) for row in rows], [one["width"] for one in candidates], rtol=1e-8)
-
-
-def test_json_for_scripts(run, tmp_path):
-    result = run("--out", tmp_path, "--json")
-    answer = json.loads(result.stdout)
-    assert result.exit_code == 0
-    assert len(answer["candidates"]) == 2
-    assert answer["candidates"][0]["nested_width"] is None
-    assert answer["words"][0].startswith("Put the pivot")
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (["--base", "0"], "--base is '0'"),
-        (["."], "a run has its rig"),
-        (["--family", "square"], "no family 'square'"),
-        (["nowhere.nc", "--rig", "nowhere.toml"], "a run has its rig"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_line(run, tmp_path, wrong, message):
-    commands.assert_refused(run("--out", tmp_path / "out", *wrong), message)
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
@@ -95,16 +74,6 @@ def test_an_interrupt_says_what_the_same_command_does(run, tmp_path, monkeypatch
     result = run("--out", tmp_path, *nested)
     assert result.exit_code == 130
     assert re.fullmatch(f"tactile-bayes: interrupted, {told}\n", result.stderr)
-
-
-def test_the_figure_shows_the_numbers(made):
-    found = xr.load_dataset(made[1] / "design.nc", engine="h5netcdf")
-    ax = draw(found)
-    line = ax.containers[0].lines[0]
-    np.testing.assert_allclose(line.get_xdata(), found.base_x.values)
-    np.testing.assert_allclose(line.get_ydata(), found.width.values)
-    best = next(line for line in ax.lines if line.get_label() == "best")
-    assert best.get_xdata() == [found.base_x.values[int(found.best)]]
 
 
 def test_the_figure_of_something_else_is_refused():

@@ -62,23 +62,6 @@ def test_noise_is_said_in_the_caption(tmp_path):
     assert "measured with noise (seed 4)" in result.stdout
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (["--only", "12"], "no figure 12: choose from 2 to 11"),
-        (["--format", "gif"], "choose from pdf, svg, png"),
-        (["--distance", "-1"], "give rod lengths above 0"),
-        (["--only", "3", "--distance", "1.5"], "profile I at the distance q = 1.5"),
-        (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
-        (["--only", "3", "--drive-step", "90"], "--drive-step is 90"),
-        (["--only", "2", "--distance", "0.3"], "figure 2 shows tip contact"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
-    commands.assert_refused(run("--out", tmp_path / "out", *wrong), message)
-    assert not (tmp_path / "out").exists()
-
-
 def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
     make, made = paper_figures.figure, []
 

@@ -19,16 +19,18 @@ def quick(monkeypatch):
 
 
 def test_each_has_a_row_and_one_table(quick, record, as_stated, tmp_path):
-    other = tmp_path / "other.csv"
+    other = tmp_path / "b" / record.name
+    other.parent.mkdir()
     other.write_bytes(record.read_bytes())
+    names = [f"{record.parent.name}-record", "b-record"]  # the same but for the folder
     options = ("--rig", as_stated, "--force-noise", 0.04, "--max-seconds", 3, "--out", tmp_path / "runs")
     result = call("infer", record, other, *options)
     assert result.exit_code == 0, result.output
-    assert [line.split()[0] for line in result.stdout.splitlines()[1:3]] == ["record", "other"]
+    assert [line.split()[0] for line in result.stdout.splitlines()[1:3]] == names
     assert "0.500" in result.stdout
     assert (tmp_path / "runs" / "runs.csv").is_file()
     tasks = [one.args[0] for one in quick.call_args_list]
-    assert [task.out.name for task in tasks] == ["record", "other"]
+    assert [task.out.name for task in tasks] == names
     assert tasks[0].rig.load_cell.force_noise == 0.04
     assert tasks[0].settings.max_seconds == 3.0
 

@@ -13,7 +13,6 @@ import typer
 from helpers import commands
 from helpers.report_pages import analysed_quickly, coarse_record
 from tactile_bayes.cli.progress import resumable_bar, step_bar
-from tactile_bayes.record import write_record
 from tactile_bayes.rig import Rig
 from tactile_bayes.tasks import TaskProgress
 
@@ -90,33 +89,22 @@ def test_a_termination_that_the_sampler_answers_is_still_one():
 
 
 @pytest.mark.slow
-def test_a_report_shows_its_steps(tmp_path, monkeypatch):
-    analysed_quickly(coarse_record(), tmp_path, rig=Rig(unknown="nothing"))
-    steps = _steps_shown(monkeypatch, "report", ["report", str(tmp_path)])
-    assert steps == [(done, 5) for done in range(1, 6)]
-
-
-def test_an_inspection_shows_its_steps(tmp_path, monkeypatch):
-    write_record(coarse_record(), tmp_path / "record.csv")
-    steps = _steps_shown(monkeypatch, "inspection", ["inspect", str(tmp_path / "record.csv")])
-    assert steps == [(done, 3) for done in range(1, 4)]
-
-
-def test_a_scan_its_measurement_and_its_contacts_show_their_steps(tmp_path, monkeypatch):
-    ideal, measured = str(tmp_path / "ideal.csv"), str(tmp_path / "measured.csv")
-    coarse = ["--drive-step", "8", "--figure", str(tmp_path / "sweep.png")]
-    assert _steps_shown(monkeypatch, "scanning", ["scan", "--out", ideal, *coarse]) == [(1, 3), (2, 3)]
-    noise = ["--force-noise", "0.05", "--moment-noise", "0.02"]
-    assert _steps_shown(monkeypatch, "measurement", ["measure", ideal, *noise, "--out", measured]) == [(1, 2)]
-    found = ["reconstruct", measured, "--out", str(tmp_path / "contacts")]
-    assert _steps_shown(monkeypatch, "reconstruction", found) == [(1, 2)]
-
-
-def _steps_shown(monkeypatch, module, words):
-    steps = []
-    monkeypatch.setattr(
-        f"tactile_bayes.cli.{module}.step_bar", lambda quiet: nullcontext(lambda *step: steps.append(step))
-    )
-    result = commands.call(*words)
-    assert result.exit_code == 0, result.output
-    return steps
+@pytest.mark.usefixtures("coarse_pictures")
+def test_commands_show_their_steps(tmp_path, monkeypatch):
+    ideal, measured, run = tmp_path / "ideal.csv", tmp_path / "measured.csv", tmp_path / "run"
+    analysed_quickly(coarse_record(), run, rig=Rig(unknown="nothing"))
+    noise = ("--force-noise", 0.05, "--moment-noise", 0.02)
+    for module, words, expected in (
+        ("scanning", ("scan", "--out", ideal, "--drive-step", 8, "--figure", tmp_path / "sweep.png"), [(1, 3), (2, 3)]),
+        ("measurement", ("measure", ideal, *noise, "--out", measured), [(1, 2)]),
+        ("inspection", ("inspect", measured), [(1, 3), (2, 3), (3, 3)]),
+        ("reconstruction", ("reconstruct", measured, "--out", tmp_path / "contacts"), [(1, 2)]),
+        ("report", ("report", run), [(done, 5) for done in range(1, 6)]),
+    ):
+        steps = []
+        monkeypatch.setattr(
+            f"tactile_bayes.cli.{module}.step_bar", lambda quiet, to=steps: nullcontext(lambda *step: to.append(step))
+        )
+        result = commands.call(*words)
+        assert result.exit_code == 0, result.output
+        assert steps == expected, module

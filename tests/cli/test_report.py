@@ -3,37 +3,18 @@
 import json
 import shlex
 from functools import partial
-from typing import get_type_hints
 
 import pytest
 
 from helpers import commands
 from helpers.report_pages import Page, analysed_quickly, coarse_record
-from tactile_bayes.cli import report as report_command
-from tactile_bayes.cli.command import Output
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
-from tactile_bayes.report.overlay import Laid
-from tactile_bayes.report.writing import WrittenPage
 from tactile_bayes.rig import Rig
 from tactile_bayes.uncertainty import contour_band, overlay_distance, read_overlay
 from tactile_bayes.uncertainty.summary import reach
 
 call = partial(commands.call, "report")
-
-
-@pytest.mark.usefixtures("quick")
-def test_infer_states_its_file_and_its_words(tmp_path):
-    path, out = tmp_path / "my record.csv", tmp_path / "run"
-    write_record(coarse_record(), path)
-    rig = tmp_path / "rig.toml"
-    rig.write_text('unknown = "nothing"\n', encoding="utf-8")
-    words = ["infer", str(path), "--rig", str(rig), "--out", str(out), "--quiet"]
-    assert commands.call(*words).exit_code == 0
-    assert call(out).exit_code == 0
-    page = Page((out / "report.html").read_text(encoding="utf-8"))
-    assert page.texts["code"][0] == shlex.join(["tactile-bayes", *words])
-    assert [heading.endswith(" my record.csv") for heading in page.texts["h1"]] == [True]
 
 
 @pytest.fixture(scope="module")
@@ -43,25 +24,29 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def written(folder):
-    return call(folder)
-
-
-def test_it_writes_the_page_into_the_run(folder, written):
-    result = written
+def test_it_writes_the_page_into_the_run_or_where_it_is_told(folder, tmp_path):
+    result = call(folder)
     assert result.exit_code == 0, result.output
-    path = folder / "report.html"
+    path, out = folder / "report.html", tmp_path / "page.html"
     assert result.stdout.startswith(f"{path} ({path.stat().st_size / 1e3:.0f} kB): ")
     assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
-
-
-@pytest.mark.usefixtures("written")
-def test_it_writes_where_it_is_told_and_the_same_page(folder, tmp_path):
-    out = tmp_path / "page.html"
     result = call(folder, "--out", out, "--quiet")
     assert result.stdout == f"{out}\n"
-    assert out.read_bytes() == (folder / "report.html").read_bytes()
+    assert out.read_bytes() == path.read_bytes()
+    answer = json.loads(call(folder, "--out", out, "--json").stdout)
+    assert answer == {"report": str(out), "bytes": out.stat().st_size}
+
+
+@pytest.mark.usefixtures("quick")
+def test_infer_states_its_file_and_its_words(as_stated, tmp_path):
+    path, out = tmp_path / "my record.csv", tmp_path / "run"
+    write_record(coarse_record(), path)
+    words = ["infer", str(path), "--rig", str(as_stated), "--out", str(out), "--quiet"]
+    assert commands.call(*words).exit_code == 0
+    assert call(out).exit_code == 0
+    page = Page((out / "report.html").read_text(encoding="utf-8"))
+    assert page.texts["code"][0] == shlex.join(["tactile-bayes", *words])
+    assert [heading.endswith(" my record.csv") for heading in page.texts["h1"]] == [True]
 
 
 def test_a_contour_is_laid_over_it_and_drawn_beside_the_page(folder, tmp_path):
@@ -89,24 +74,8 @@ def test_a_contour_is_laid_over_it_and_drawn_beside_the_page(folder, tmp_path):
     assert figure.read_bytes() == before
 
 
-def test_json_for_scripts(folder, tmp_path, monkeypatch):
-    out = tmp_path / "page.html"
-
-    def write(run, path, *options):
-        assert run == [folder]
-        path.write_text("a page", encoding="utf-8")
-        return WrittenPage(path, Laid("", {}), None)
-
-    monkeypatch.setattr("tactile_bayes.report.writing.report_into", write)
-    result = call(folder, "--out", out, "--json")
-    assert json.loads(result.stdout) == {"report": str(out), "bytes": out.stat().st_size}
-    assert get_type_hints(report_command.report)["output"] is Output
-
-
 def test_what_is_wrong_is_said_in_a_line(folder, tmp_path):
     for arguments, message in (
-        ([tmp_path / "nowhere"], f"no folder {tmp_path / 'nowhere'}"),
-        ([tmp_path], f"{tmp_path} holds no posterior.nc"),
         ([folder, "--compare", tmp_path], f"{tmp_path} holds no comparison.nc"),
         ([folder, "--out", tmp_path / "no" / "page.html"], f"{tmp_path / 'no'}: No such file or directory"),
     ):

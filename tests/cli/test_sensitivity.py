@@ -10,8 +10,7 @@ import xarray as xr
 
 import tactile_bayes as tb
 from helpers import commands
-from tactile_bayes.contours import Joined, Parabola
-from tactile_bayes.planning.amplification import amplification
+from tactile_bayes.contours import Parabola
 from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.runs import sensitivity as sensitivity_run
 
@@ -50,22 +49,15 @@ def analysed():
     return tb.sensitivity(rng=1, drive=tb.Rotation(drive_step=float(np.radians(6.0))), samples=8)
 
 
-@pytest.fixture(scope="module")
-def short(analysed):
-    """What the command speaks of, without the rest."""
-    groups = {name: analysed[name].to_dataset() for name in ("information", "required_noise")}
-    tree = xr.DataTree.from_dict(groups)
-    tree.attrs = analysed.attrs
-    return tree
-
-
 @pytest.fixture
-def asked(monkeypatch, short):
-    """What the library is asked for; it answers at once, and nothing is drawn."""
+def asked(monkeypatch, analysed):
+    """What the library is asked for; it answers at once, in short, and nothing is drawn."""
     given = {}
 
     def answer(**options):
         given["sensitivity"] = options
+        short = xr.DataTree.from_dict({n: analysed[n].to_dataset() for n in ("information", "required_noise")})
+        short.attrs = analysed.attrs
         return short
 
     def cell(task):
@@ -100,16 +92,12 @@ def test_words_come_first_then_bounds_then_the_files(done, analysed):
     assert all(path.startswith(str(out)) for path in paths.values())
 
 
-def test_files_are_written(done):
+def test_files_hold_what_was_found(done, analysed):
     out, _ = done
     assert {path.name for path in out.iterdir()} == {"sensitivity.nc", "words.txt", "study", *FIGURES}
     assert {path.name for path in (out / "study").iterdir()} == {"cells.json", "study.nc", "study.png"}
     for path in [*out.glob("*.png"), out / "study" / "study.png"]:
         assert path.read_bytes().startswith(b"\x89PNG")
-
-
-def test_files_hold_what_was_found(done, analysed):
-    out, _ = done
     with xr.open_datatree(out / "sensitivity.nc", engine="h5netcdf") as kept:
         assert kept.attrs["words"] == analysed.attrs["words"]
         for name, group in analysed.children.items():
@@ -155,16 +143,6 @@ def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
     assert not (tmp_path / "study").exists()
 
 
-def test_profiles_are_scaled_to_the_rod(asked, tmp_path, rig_file):
-    rod = ("--rig", rig_file("[rod]\nlength = 0.2\nflexural_rigidity = 1e-4\ndiameter = 5e-4\n"))
-    assert call("--out", tmp_path, "--profile", "IV", "--distance", 0.4, *rod).exit_code == 0
-    options = asked["sensitivity"]
-    assert options["rig"].rod == tb.Rod(0.2, 1e-4, 5e-4)
-    assert isinstance(options["contour"], Joined)
-    assert float(options["contour"].height(0.0)) == pytest.approx(0.08)
-    assert float(options["contour"].height(0.2)) == pytest.approx(0.28)
-
-
 def test_rig_and_options_arrive(asked, tmp_path, rig_file):
     rig = rig_file(
         '[load_cell]\nforce_noise = 0.1\nmoment_noise = 0.03\ndrive_angle_noise = "0.5 deg"\n'
@@ -196,35 +174,7 @@ def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path)
     assert len(study.cells) == 8
 
 
-# --- Stopping and going on ------------------------------------------------------------------------------------------
-
-
-# --- Refusals -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--base", "0"], "--base is '0'"),
-        (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
-        (["--distance", "1.5"], "out of reach"),
-        (["--band-width", "1e-12"], "band of 1e-12"),
-        (["--profile", "V"], "no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
-        (["--replicates", "1", "--workers", "few"], "--workers is 'few'"),
-        (["--noise-factor", "1"], "--noise-factor is for a study: give --replicates"),
-        (["--distance", "0.4", "--distance", "0.5"], "more than one --distance is for a study"),
-    ],
-)
-def test_refusals(tmp_path, monkeypatch, options, words):
-    module = importlib.import_module("tactile_bayes.planning.sensitivity")
-    monkeypatch.setattr(module, "amplification", lambda plan: amplification_at_once(plan))
-    commands.assert_refused(call("--out", tmp_path / "out", "--drive-step", 6, *options), words)
-    assert not (tmp_path / "out").exists()
-
-
-def amplification_at_once(plan):
-    """On the drive angles of the record, and not close to its ends."""
-    return amplification(plan.at_angles(np.radians(np.arange(-30.0, 211.0, 10.0))))
+# --- The best rod ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -252,20 +202,3 @@ def test_no_rod_that_serves_is_said():
     words = sensitivity_run.rod_message(rods)
     assert words.startswith("None of 2 rods ")
     assert words.endswith("(1 {}, 1 {}).".format(*statuses))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "state length, flexural_rigidity, diameter and elastic_strain under [rod]"),
-        ("[rod]\nlength = 0.2\nflexural_rigidity = 1e-3\ndiameter = 1e-3\n", "elastic_strain under [rod]"),
-        (
-            "[rod]\nlength = 0.2\nflexural_rigidity = 1e-3\ndiameter = 1e-3\nelastic_strain = 0.01\n",
-            "noise under [load_cell]",
-        ),
-    ],
-)
-def test_half_a_material_or_no_rig_is_refused_before_any_work(tmp_path, rig_file, text, message):
-    result = call("--out", tmp_path / "new", "--rig", rig_file(text), "--best-rod", *QUICK)
-    commands.assert_refused(result, message)
-    assert not (tmp_path / "new").exists()

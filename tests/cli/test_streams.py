@@ -42,13 +42,6 @@ def called(encoding, *words):
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_table_arrives(encoding, record):
-    written, errors = called(encoding, "inspect", record)
-    assert errors == b""
-    assert "lets go" in written.decode(encoding)
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
 def test_every_sign_arrives(encoding):
     """Of all planes that the package may ever use, and bytes of file names that are no text."""
     signs = "".join(map(chr, [*range(32, 0x3000), *range(0xDC80, 0xDD00)]))
@@ -59,39 +52,36 @@ def test_every_sign_arrives(encoding):
     assert "R" in written[0].decode(encoding)
 
 
-def test_stand_ins_can_be_read():
-    with streams("ascii") as written:
-        print("R̂ 28.0° −3 ± 2 µN, Δκ₀ ≥ ½ N m², “é” ⁻¹ 日 \udcff")
-    assert written[0] == b'R^ 28.0deg -3 +/- 2 uN, Deltakappa0 >= 1/2 N m^2, "e" ^-^1 ? \\xff\n'
-
-
-@pytest.mark.parametrize("encoding", ["cp1252", "utf-8"])
-def test_what_an_encoding_has_stays_as_it_is(encoding):
+@pytest.mark.parametrize(
+    ("encoding", "text", "expected"),
+    [
+        (
+            "ascii",
+            "R̂ 28.0° −3 ± 2 µN, Δκ₀ ≥ ½ N m², “é” ⁻¹ 日 \udcff",
+            'R^ 28.0deg -3 +/- 2 uN, Deltakappa0 >= 1/2 N m^2, "e" ^-^1 ? \\xff',
+        ),
+        ("cp1252", "28.0° ± 2 µN m²", "28.0° ± 2 µN m²"),
+        ("utf-8", "28.0° ± 2 µN m²", "28.0° ± 2 µN m²"),
+    ],
+)
+def test_stand_ins_can_be_read_and_what_an_encoding_has_stays_as_it_is(encoding, text, expected):
     with streams(encoding) as written:
-        print("28.0° ± 2 µN m²")
-    assert written[0] == "28.0° ± 2 µN m²\n".encode(encoding)
+        print(text)
+    assert written[0] == f"{expected}\n".encode(encoding)
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
-def test_json_is_ascii_on_every_stream(encoding, record, tmp_path):
+def test_results_arrive(encoding, record, tmp_path):
+    """Tables and help in the encoding of the stream, JSON and TOML in ASCII on every stream."""
     path = tmp_path / "°.csv"
     path.write_bytes(record.read_bytes())
+    for words, part in ((("inspect", record), "lets go"), (("infer", "--help"), "Usage: ")):
+        written, errors = called(encoding, *words)
+        assert errors == b""
+        assert part in written.decode(encoding)
     written, _ = called(encoding, "inspect", path, "--json")
-    assert written.isascii()
-    assert str(path) in json.loads(written)["next"]
-
-
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
-@pytest.mark.parametrize("words", [["--help"], *([name, "--help"] for name in ("infer", "measure", "sensitivity"))])
-def test_help_arrives(encoding, words):
-    written, errors = called(encoding, *words)
-    assert "Usage: " in written.decode(encoding)
-    assert errors == b""
-
-
-def test_an_example_is_text_of_toml_on_every_stream():
-    written, _ = called("cp1252", "dataset", "example")
-    assert written.isascii()
+    assert str(path) in json.loads(written.decode("ascii"))["next"]
+    written, _ = called(encoding, "dataset", "example")
     assert tomllib.loads(written.decode("ascii"))
 
 

@@ -59,7 +59,3 @@ def test_the_report_refuses_that_of_another_posterior(folder, tmp_path):
     write_result(tree, tmp_path / "posterior.nc")
     (tmp_path / "trust.nc").write_bytes((folder / "trust.nc").read_bytes())
     commands.assert_refused(commands.call("report", tmp_path), "another posterior")
-
-
-def test_a_folder_without_a_posterior_is_refused(tmp_path):
-    commands.assert_refused(call(tmp_path), "holds no posterior.nc")

@@ -48,8 +48,17 @@ def undrawn(monkeypatch):
     monkeypatch.setattr(contour_run, "_draw", lambda *arguments, **options: {})
 
 
-def write(path, *parts):
-    path.write_text("".join(text for part in parts for text in part), encoding="utf-8")
+@pytest.fixture(scope="module")
+def rows(lines):
+    return lines[1]
+
+
+@pytest.fixture
+def measure(path, lines):
+    """Write the file anew, with its header and these rows."""
+    return lambda *parts: path.write_text(
+        "".join(line for part in (lines[0], *parts) for line in part), encoding="utf-8"
+    )
 
 
 @pytest.fixture
@@ -74,12 +83,17 @@ def objects(result):
     return [json.loads(line) for line in result.stdout.splitlines()]
 
 
-def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, lines, follow):
-    head, rows = lines
-    write(path, head, rows[:60])
-    result = follow(
-        then=[partial(write, path, head, rows[:100], rows[100][:9]), partial(write, path, head, rows[:130])]
-    )
+def streamed(*parts):
+    """Medians of a stream that is given these parts of a record one after the other."""
+    stream = Stream(rig=Rig(unknown="nothing"), rng=1, particles=120)
+    for part in parts:
+        stream.update(part)
+    return [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
+
+
+def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, follow, rows, measure):
+    measure(rows[:60])
+    result = follow(then=[partial(measure, rows[:100], rows[100][:9]), partial(measure, rows[:130])])
     assert result.exit_code == 0, result.output
     said = result.stdout.splitlines()
     assert said[0].startswith("60 samples, 60 new; band up to ")
@@ -102,17 +116,16 @@ def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, lines, follow
 
 
 @pytest.mark.slow
-def test_its_page_loads_itself_again_until_the_end(path, lines, follow):
-    head, rows = lines
+def test_its_page_loads_itself_again_until_the_end(path, follow, rows, measure):
     pages = []
-    write(path, head, rows[:4])
+    measure(rows[:4])
 
     def look():
         pages.append((path.parent / "run" / "watch.html").read_text(encoding="utf-8"))
 
     def grow():
         look()
-        write(path, head, rows[:50], ["broken\n"])
+        measure(rows[:50], ["broken\n"])
 
     follow("--poll", 3, then=[grow, look])
     look()
@@ -127,18 +140,17 @@ def test_its_page_loads_itself_again_until_the_end(path, lines, follow):
     assert 'id="band-detail"' in last
 
 
-def test_each_update_is_a_line_for_programs(path, lines, follow):
-    head, rows = lines
+def test_each_update_is_a_line_for_programs(path, lines, follow, rows, measure):
     spoilt = [*rows[:30], rows[30].replace(rows[30].split(",")[6], "nan"), *rows[31:50]]
-    write(path, head, rows[:30])
-    result = follow(json=True, then=[partial(write, path, head, spoilt)])
+    measure(rows[:30])
+    result = follow(json=True, then=[partial(measure, spoilt)])
     one, two, end = objects(result)
     assert [each["event"] for each in (one, two, end)] == ["update", "update", "end"]
     assert [(each["samples"], each["new"]) for each in (one, two)] == [(30, 30), (49, 19)]
     assert {row["quantity"] for row in two["quantities"]} == {"a", "q", "x_c", "noise_scale"}
     assert two["seconds_behind"] >= two["seconds"] > 0.0
     (warning,) = two["warnings"]
-    assert re.search(rf"line {len(head) + 31}, column 'force_x': .*nan", warning)
+    assert re.search(rf"line {len(lines[0]) + 31}, column 'force_x': .*nan", warning)
     assert one["warnings"] == []
     assert warning in result.stderr
     assert (end["reason"], end["samples_taken"], end["converged"]) == ("no new rows for 0 s", 49, True)
@@ -146,12 +158,9 @@ def test_each_update_is_a_line_for_programs(path, lines, follow):
 
 
 @pytest.mark.slow
-def test_a_file_that_is_replaced_begins_again(path, lines, follow):
-    head, rows = lines
-    write(path, head, rows[:40])
-    result = follow(
-        json=True, then=[partial(write, path, head), partial(write, path, head, rows[5:30]), path.unlink, lambda: None]
-    )
+def test_a_file_that_is_replaced_begins_again(path, follow, rows, measure):
+    measure(rows[:40])
+    result = follow(json=True, then=[measure, partial(measure, rows[5:30]), path.unlink, lambda: None])
     one, two, end = objects(result)
     assert (one["samples"], two["samples"], two["new"]) == (40, 25, 25)
     assert f"{path} has been replaced" in two["warnings"][0]
@@ -159,48 +168,41 @@ def test_a_file_that_is_replaced_begins_again(path, lines, follow):
 
 
 @pytest.mark.slow
-def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
-    head, rows = lines
-    write(path, head, rows[:30])
+def test_the_same_command_goes_on_with_the_same_numbers(path, follow, rows, measure):
+    measure(rows[:30])
     first = follow(json=True)
-    write(path, head, rows[:60])
+    measure(rows[:60])
     resumed, grown, _ = objects(follow(json=True))
     assert (resumed["samples"], resumed["new"]) == (30, 0)
     assert resumed["quantities"] == objects(first)[0]["quantities"]
     measured = read_record(path)
-    stream = Stream(rig=Rig(unknown="nothing"), rng=1, particles=120)
-    stream.update(measured.isel(sample=slice(0, 30)))
-    stream.update(measured.isel(sample=slice(30, None)))
-    expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
+    expected = streamed(measured.isel(sample=slice(0, 30)), measured.isel(sample=slice(30, None)))
     assert [row["median"] for row in grown["quantities"]] == pytest.approx(expected, rel=1e-12)
     assert follow().stdout.startswith("60 samples, resumed; ")
     for change, words in ((["--seed", 2], "seed (was"), (["--family", "circle"], "family (was")):
         commands.assert_refused(follow(*change), words)
-    write(path, head, rows[1:70])
+    measure(rows[1:70])
     commands.assert_refused(follow(), "record (its SHA-256)")
-    write(path, head, rows[:20])
+    measure(rows[:20])
     commands.assert_refused(follow(), "samples (was '60', now '20')")
 
 
 @pytest.mark.slow
-def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
+def test_of_a_long_record_every_other_sample_is_taken(path, follow, rows, measure):
     """The posterior is that of a stream of these samples, also after a stop before they were too many."""
-    head, rows = lines
     assert 100 < len(rows) < 200
     some = ["--most-samples", 100]
-    write(path, head, rows[:90])
+    measure(rows[:90])
     first = objects(follow(*some, json=True))[0]
     assert (first["samples"], first["every"], first["warnings"]) == (90, 1, [])
-    write(path, head, rows)
+    measure(rows)
     resumed, thinned, end = objects(follow(*some, json=True))
     assert (resumed["samples"], resumed["every"]) == (90, 1)
     half = (len(rows) + 1) // 2
     assert (thinned["samples"], thinned["new"], thinned["every"]) == (half, half, 2)
     assert not thinned["restarted"]
     assert any("one sample of 2" in words for words in thinned["warnings"])
-    stream = Stream(rig=Rig(unknown="nothing"), rng=1, particles=120)
-    stream.update(read_record(path).isel(sample=slice(None, None, 2)))
-    expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
+    expected = streamed(read_record(path).isel(sample=slice(None, None, 2)))
     assert [row["median"] for row in thinned["quantities"]] == pytest.approx(expected, rel=1e-12)
     assert end["samples_taken"] == half
     assert read_result(path.parent / "run" / "posterior.nc").attrs["samples_taken_every"] == 2
@@ -226,23 +228,21 @@ def test_samples_of_a_load_cell_that_drifts_are_all_taken(record, tmp_path):
 
 
 @pytest.mark.slow
-def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):
+def test_samples_that_do_not_go_on_in_order_are_taken_anew(follow, rows, measure):
     """The backward sweep, of which some samples came before, now with the whole forward sweep before them."""
-    head, rows = lines
     turn = next(k for k, row in enumerate(rows) if "backward" in row)
-    write(path, head, rows[:11], rows[12:13])
-    result = follow(json=True, then=[partial(write, path, head, rows[:11], rows[12:13], rows[11:12], rows[13:turn])])
+    measure(rows[:11], rows[12:13])
+    result = follow(json=True, then=[partial(measure, rows[:11], rows[12:13], rows[11:12], rows[13:turn])])
     _, two, _ = objects(result)
     assert (two["samples"], two["new"], two["restarted"]) == (turn, turn, True)
     assert f"{turn} taken again" in two["warnings"][0]
 
 
 @pytest.mark.slow
-def test_it_ends_when_the_band_is_narrow(path, lines, follow):
-    head, rows = lines
-    write(path, head, rows[:20])
+def test_it_ends_when_the_band_is_narrow(follow, rows, measure):
+    measure(rows[:20])
     options = ("--between", "-0.02,0.02", "--until-width", 0.002)
-    result = follow(*options, json=True, then=[partial(write, path, head, rows), lambda: pytest.fail("goes on")])
+    result = follow(*options, json=True, then=[partial(measure, rows), lambda: pytest.fail("goes on")])
     one, two, end = objects(result)
     assert (one["may_stop"], two["may_stop"]) == (False, True)
     assert one["band_width"] > 0.002 > two["band_width"]
@@ -250,9 +250,8 @@ def test_it_ends_when_the_band_is_narrow(path, lines, follow):
 
 
 @pytest.mark.slow
-def test_of_several_families_the_probabilities_are_told(path, lines, follow):
-    head, rows = lines
-    write(path, head, rows[:60])
+def test_of_several_families_the_probabilities_are_told(path, follow, rows, measure):
+    measure(rows[:60])
     options = ("--family", "circle", "--family", "parabola", "--until-probability", 0.9)
     one, end = objects(follow(*options, json=True, then=[lambda: pytest.fail("goes on")]))
     assert list(one["probabilities"]) == ["circle", "parabola"]
@@ -275,27 +274,29 @@ def test_a_wrong_model_is_told_once(path, follow, tmp_path):
     )
     write_record(record.isel(sample=slice(0, 60)), tmp_path / "whole.csv")
     text = (tmp_path / "whole.csv").read_text(encoding="utf-8").splitlines(keepends=True)
-    write(path, text[:-45])
-    result = follow(then=[partial(write, path, text[: len(text) - left]) for left in (30, 15, 0)])
+
+    def leave(count):
+        path.write_text("".join(text[: len(text) - count]), encoding="utf-8")
+
+    leave(45)
+    result = follow(then=[partial(leave, count) for count in (30, 15, 0)])
     assert result.exit_code == 0
     assert result.stderr.count("(e-value ") == 1
     assert "[unknown] of rig.toml" in result.stderr
 
 
 @pytest.mark.slow
-def test_no_family_is_probable_while_an_evidence_is_too_small(path, lines, follow, monkeypatch):
+def test_no_family_is_probable_while_an_evidence_is_too_small(follow, monkeypatch, rows, measure):
     monkeypatch.setattr(watch, "LOST_ONCE", -1.0)
-    head, rows = lines
-    write(path, head, rows[:60])
+    measure(rows[:60])
     options = ("--family", "circle", "--family", "parabola", "--until-probability", 0.9)
     said = follow(*options).stdout
     assert "; too small for circle, parabola: " in said
     assert "60 samples: no new rows" in said
 
 
-def test_control_c_ends_it_with_the_answer(path, lines, as_stated, monkeypatch):
-    head, rows = lines
-    write(path, head, rows[:10])
+def test_control_c_ends_it_with_the_answer(path, as_stated, monkeypatch, rows, measure):
+    measure(rows[:10])
     monkeypatch.setattr(watching.time, "sleep", lambda seconds: os.kill(os.getpid(), signal.SIGINT))
     result = commands.call("watch", path, "--out", path.parent / "run", "--rig", as_stated, *FEW)
     assert result.exit_code == 0
@@ -306,51 +307,18 @@ def test_control_c_ends_it_with_the_answer(path, lines, as_stated, monkeypatch):
     assert "interrupted before" in result.stderr
 
 
-def test_quiet_prints_the_answer_alone_and_warns_of_few_particles(path, lines, follow):
-    write(path, lines[0], lines[1][:10])
+def test_quiet_prints_the_answer_alone_and_warns_of_few_particles(follow, rows, measure):
+    measure(rows[:10])
     result = follow("--quiet", "--particles", 100)
     assert result.stdout.startswith("Ended after ")
     assert re.search("100 particles .* 4 parameters.* --particles 120", result.stderr)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--until-width", 0.1], "like --between"),
-        (["--until-width", -1, "--between", "0,1"], "until_width is -1.0"),
-        (["--between", "0.1"], "--between is '0.1'"),
-        (["--between", "0.1,-0.1"], "smaller one first"),
-        (["--family", "star"], "star"),
-        (["--until-probability", 0.9], "until_probability is for several"),
-    ],
-)
-def test_options_that_are_wrong_are_refused(path, lines, follow, options, words):
-    write(path, lines[0], lines[1][:5])
-    commands.assert_refused(follow(*options), words)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[unknown]\nleaver = 0.0\n", "did you mean 'lever'?"),
-        ('[file]\nforce_x = "Fx"\n', "Fx"),
-    ],
-)
-def test_a_rig_that_is_wrong_is_refused(path, lines, follow, rig_file, text, words):
-    write(path, lines[0], lines[1][:5])
-    commands.assert_refused(follow(rig=rig_file(text)), words)
-
-
-def test_what_can_never_be_followed_is_refused(path, tmp_path):
-    for where, words in ((tmp_path, "is a folder"), (tmp_path / "record.nc", "only a .csv file")):
-        commands.assert_refused(commands.call("watch", where, "--out", tmp_path / "run"), words)
-
-
-def test_a_file_without_samples_is_said_to_have_none(path, lines, follow):
+def test_a_file_without_samples_is_refused(path, follow, measure):
     commands.assert_refused(follow(), path, "no new rows", "no sample")
-    write(path, lines[0])
+    measure()
     commands.assert_refused(follow(), path, "no sample")
-    write(path, ["drive_angle,force_x\n", "1.0,2.0\n"])
+    path.write_text("drive_angle,force_x\n1.0,2.0\n", encoding="utf-8")
     commands.assert_refused(follow(), "no column 'sweep'")
 
 

@@ -92,24 +92,6 @@ def integrals(function, stops):
     return found.integral, 2.0 * found.error + 1e-14
 
 
-@pytest.mark.slow
-@every
-def test_the_radius_adds_up_to_the_contour(family, data):
-    """ξ' = ρ cos α and η' = ρ sin α, integrated over α wherever ρ is finite.
-
-    To 64 roundings of the contour's size and, because α is rounded, of the radius.
-    """
-    contour, alpha = drawn(data, family)
-    alpha = apart(contour.locate(smooth_stretches(contour, contour.parameter_of_slope(alpha))).slope_angle)
-    radius, points = contour.radius_of_curvature(alpha), contour.point(alpha)
-    assert np.all(radius >= 0.0)
-    finite = np.isfinite(radius[1:]) & np.isfinite(radius[:-1])
-    for trig, coordinate in zip((np.cos, np.sin), points, strict=True):
-        integral, off = integrals(lambda t, trig=trig: contour.radius_of_curvature(t) * trig(t), alpha)
-        bound = off + 64 * EPS * (size_of(contour) + radius[1:] + radius[:-1])
-        assert np.all((np.abs(integral - np.diff(coordinate)) <= bound)[finite])
-
-
 @every
 def test_the_rates_add_up_to_the_locus(family, data):
     """The own parameter is continuous, over knots and edges too, and its rates are derivatives: to 64 roundings."""
@@ -152,6 +134,7 @@ def test_point_height_and_parameters_tell_of_one_contour(family, data):
     assert np.all(np.abs(contour.locate(contour.parameter_of_x(x)).x - x) <= rounding)
     parameter = contour.parameter_of_slope(alpha)
     here = contour.locate(parameter)
+    assert np.all(np.hypot(here.x - x, here.y - y) <= rounding * (1.0 + np.abs(np.tan(alpha))))
     per_rounding = 32 * EPS * (np.pi + here.slope_rate * np.abs(parameter))
     lost = 4.0 if family in (FAMILIES["function"], FAMILIES["measured"]) else 1.0  # sums of many terms
     assert np.all(np.abs(here.slope_angle - alpha) <= lost * per_rounding)
@@ -208,6 +191,12 @@ def test_nothing_beyond_the_ends_and_of_what_is_no_number(family, data):
             assert np.isnan(contour.parameter_of_x(outside))
 
 
+def test_a_circle_has_a_height_up_to_its_ends():
+    circle = Circle(0.5, 0.3, 0.1)
+    np.testing.assert_allclose(circle.height([-0.41, -0.4, 0.6, 0.61]), [np.nan, 0.8, 0.8, np.nan], rtol=4 * EPS)
+    assert [float(end) for end in circle.domain] == [-np.pi / 2, np.pi / 2]
+
+
 def test_the_papers_formulas():
     x = np.linspace(-0.9, 0.9, 19)
     np.testing.assert_allclose(paper_profile("I", 0.3).height(x), 0.7 * x**2 + 0.3, rtol=4 * EPS)
@@ -215,8 +204,6 @@ def test_the_papers_formulas():
     np.testing.assert_allclose(paper_profile("III", 0.3).height(x), 1.3 - np.sqrt(1 - x**2), rtol=8 * EPS)
     iv = np.where(x < 0, 0.5 * x**2, x**4) + 0.3
     np.testing.assert_allclose(paper_profile("IV", 0.3).height(x), iv, rtol=4 * EPS)
-    with refused(ContourError, "'V'", "'IV'"):
-        paper_profile("V", 0.3)
 
 
 def test_the_radius_jumps_at_the_vertex_of_profile_four():
@@ -225,17 +212,6 @@ def test_the_radius_jumps_at_the_vertex_of_profile_four():
     assert np.isinf(iv.radius_of_curvature(0.0))
     assert {float(k) for k in iv.knots} == {0.0}
     np.testing.assert_allclose(iv.point([-1e-300, 0.0, 1e-300]), [[0, 0, 0], [0.3] * 3], atol=1e-90)
-
-
-def test_nothing_beyond_a_contours_end():
-    circle = Circle(0.5, 0.3, 0.1)
-    assert np.isnan(circle.height([-0.41, 0.61])).all()
-    np.testing.assert_allclose(circle.height([-0.4, 0.6]), 0.8, rtol=4 * EPS)
-    assert np.isnan(circle.point([1.58, -1.58])).all()
-    assert np.isnan(Parabola(0.5, 0.3).point(np.nextafter(np.pi / 2, 2))).all()
-    with np.errstate(all="raise"):
-        lo, hi = circle.domain
-    assert (float(lo), float(hi)) == (-np.pi / 2, np.pi / 2)
 
 
 # --- arrays of parameters --------------------------------------------------------------------------------------------
@@ -324,6 +300,7 @@ def BATH_CURVATURE(x):
 @pytest.mark.parametrize(
     ("build", "named"),
     [
+        (lambda: paper_profile("V", 0.3), ["'V'", "'IV'"]),
         (lambda: Parabola(0.0, 0.3), ["Parabola", "a = 0.0"]),
         (lambda: Parabola([0.5, -0.2], 0.3), ["Parabola", "a = -0.2"]),
         (lambda: Parabola(np.inf, 0.3), ["Parabola", "a = inf"]),
@@ -374,10 +351,6 @@ def test_refusals_say_what_was_wrong(build, named):
     [
         (lambda: from_function(np.sin, (-1, 1)), r"convex.* x = 0\.00\d* to 0\.99"),
         (lambda: from_function(BATH, (-2, 2), slope=BATH_SLOPE, curvature=BATH_CURVATURE), r"straight .* x = -0\.4"),
-        (
-            lambda: from_function(np.square, (-1, 1), slope=lambda x: 2 * x, curvature=lambda x: 3 + 0 * x),
-            r"curvature given .* x = .* 0\.00785",
-        ),
     ],
 )
 def test_refusals_say_where_and_by_how_much(build, where):

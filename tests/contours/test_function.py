@@ -88,16 +88,6 @@ def test_where_the_curvature_jumps_halves_are_asked_for_and_they_work(at, told):
         assert a.drive_angle == pytest.approx(b.drive_angle, abs=1e-9)
 
 
-def test_an_edge_is_named():
-    with refused(ContourError, "slope given", "x ≈ 0.3", "from -0.4 to 1.6", "Joined"):
-        from_function(
-            lambda x: np.abs(x - 0.3) + x**2,
-            DOMAIN,
-            slope=lambda x: np.where(x < 0.3, -1.0, 1.0) + 2 * x,
-            curvature=lambda x: 2.0 + 0.0 * x,
-        )
-
-
 @pytest.mark.parametrize("at", [0.0, 0.13])
 def test_a_power_with_a_broken_exponent_needs_its_derivatives_and_is_exact_with_them(at):
     def g(x):
@@ -117,18 +107,9 @@ def test_a_power_with_a_broken_exponent_needs_its_derivatives_and_is_exact_with_
     assert ours.sweeps[0].snap_off.drive_angle == pytest.approx(theirs.sweeps[0].snap_off.drive_angle, abs=1e-13)
 
 
-def test_kinks_at_several_places():
-    with refused(ContourError, "smooth", "(-2, 2)"):
-        from_function(lambda x: np.abs(x - 0.3) ** 2.5 + np.abs(x + 0.5) ** 2.5, DOMAIN)
+# --- what is refused -------------------------------------------------------------------------------------------------
 
-
-def test_wrong_derivatives_beside_a_jump_are_wrong():
-    g, slope, curvature = two_parabolas(0.0)
-    with refused(ContourError, "curvature given", "from x ="):
-        from_function(g, DOMAIN, slope=slope, curvature=lambda x: curvature(x) + 0.01 * (x > 0.0))
-
-
-# --- what is no function ---------------------------------------------------------------------------------------------
+JUMPING, SLOPE, CURVATURE = two_parabolas(0.0)
 
 
 @pytest.mark.parametrize(
@@ -141,6 +122,23 @@ def test_wrong_derivatives_beside_a_jump_are_wrong():
         (lambda: from_function(np.cosh, (-1, 1), slope=0, curvature=1), ["slope", 0]),
         (lambda: from_function(np.cosh, 1.0), ["domain", 1.0]),
         (lambda: from_function(np.cosh, (-1, 0, 1)), ["domain", (-1, 0, 1)]),
+        (
+            lambda: from_function(
+                lambda x: np.abs(x - 0.3) + x**2,
+                DOMAIN,
+                slope=lambda x: np.where(x < 0.3, -1.0, 1.0) + 2 * x,
+                curvature=lambda x: 2.0 + 0.0 * x,
+            ),
+            ["slope given", "x ≈ 0.3", "from -0.4 to 1.6", "Joined"],
+        ),
+        (
+            lambda: from_function(lambda x: np.abs(x - 0.3) ** 2.5 + np.abs(x + 0.5) ** 2.5, DOMAIN),
+            ["smooth", "(-2, 2)"],
+        ),
+        (
+            lambda: from_function(JUMPING, DOMAIN, slope=SLOPE, curvature=lambda x: CURVATURE(x) + 0.01 * (x > 0.0)),
+            ["curvature given", "from x ="],
+        ),
     ],
 )
 def test_refusals(build, named):

@@ -50,25 +50,7 @@ def test_every_family_is_right(family):
     right()
 
 
-A, Q = [0.03, 0.5, 300.0], [[0.3], [-20.0]]
 KNOTS = np.linspace(-1.3, 1.3, 5)
-
-
-@pytest.mark.parametrize(
-    "many",
-    [
-        Parabola(A, Q, 100.0),
-        Circle(A, Q),
-        Ellipse(A, 0.2, Q, 5.0),
-        PowerLaw(A, [[1.1], [50.0]], 0.3, 100.0),
-        Joined(Parabola(A, Q), PowerLaw(A, 4.0, Q)),
-        Joined(Parabola(0.2, Q, [1.0, 2.0]), Parabola(0.2, Q, [-1.0, -2.0]), x=0.0),
-        ShapeFree(KNOTS, np.multiply.outer(np.log(A), KNOTS), 0.1, Q),
-    ],
-    ids=lambda many: type(many).__name__,
-)
-def test_arrays_of_parameters_are_right(many):
-    check(many)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,11 +186,6 @@ def test_rates_of_a_family_that_is_no_graph():
         check(Arc(0.7, error=1e-3))
 
 
-def test_what_is_no_contour():
-    with refused(ContourError, None):
-        check(None)
-
-
 # --- parameters ------------------------------------------------------------------------------------------------------
 
 
@@ -263,7 +240,9 @@ def test_equality():
     assert copy.deepcopy(many) == many
 
 
-def test_a_parameter_of_a_class_of_ones_own_is_checked_as_well():
+def test_what_is_no_contour_and_no_parameter_is_refused():
+    with refused(ContourError, None):
+        check(None)
     with refused(ContourError, "Hyperbola", "size", np.abs):
         Hyperbola(np.abs)
 

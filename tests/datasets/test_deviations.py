@@ -42,20 +42,10 @@ SI = {
     },
 }
 NEVER_DRAWN = {
-    *GROUPS["gauge"],
-    *GROUPS["discrepancy"],
-    *GROUPS["rest_shape"],
-    "taper_error",
-    "noise_scale",
-    "moment_noise",
-    "force_noise",
+    *(name for group in ("gauge", "discrepancy", "rest_shape") for name in GROUPS[group]),
+    *("taper_error", "noise_scale", "moment_noise", "force_noise"),
 }
 EVERY = [name for name in PARAMETERS if name not in (*NEVER_DRAWN, "rigidity_scale")]
-
-
-def values_of(one):
-    """Values of a record's truth by the names of a circle and its rig."""
-    return {k.removeprefix("truth_").removeprefix("contour_"): v for k, v in one.attrs.items() if k.startswith("truth")}
 
 
 def unknown_but(name):
@@ -71,7 +61,7 @@ def test_readings_are_those_that_inference_expects_at_the_truth(said, frame):
     spec = changed(SI, unknown=said, load_cell__frame=frame)
     for number in (0, 3):
         one = record(spec, number)
-        truth = values_of(one)
+        truth = {k.removeprefix("truth_").removeprefix("contour_"): v for k, v in one.attrs.items() if k[:5] == "truth"}
         cell = LoadCell.from_record(one) or LoadCell()
         noisy = LoadCell.from_entries({**cell.entries(), "force_noise": 1.0, "moment_noise": 1.0})
         model = Experiment(one, Rig(load_cell=noisy, unknown=said), "circle").model
@@ -80,9 +70,8 @@ def test_readings_are_those_that_inference_expects_at_the_truth(said, frame):
         point = np.array([[{**truth, "noise_scale": 1.0}[name] for name in model.names]])
         loads, reached = model.likelihood.predict(model.contours(point), model.rig(point))
         own = model.likelihood.load_cell
-        expected = (
-            own.expected(model.unknowns.sensed(loads, model.values(point), own))[0] * model.likelihood.rod.load_units
-        )
+        sensed = model.unknowns.sensed(loads, model.values(point), own)
+        expected = own.expected(sensed)[0] * model.likelihood.rod.load_units
         assert reached.all()
         readings = np.stack([one[name].values for name in CHANNELS], axis=1)
         largest = np.abs(expected).max(axis=0)
@@ -90,21 +79,15 @@ def test_readings_are_those_that_inference_expects_at_the_truth(said, frame):
 
 
 def test_numbers_are_known_and_distributions_are_drawn():
-    spec = read_specification(
-        changed(
-            PLAIN,
-            records=400,
-            shard_records=400,
-            unknown={
-                **NOTHING,
-                "friction": {"half_normal": 0.5},
-                "lever": 0.01,
-                "moment_gain": {"choice": [0.9, 1.1]},
-                "noise_scale": {"gamma": {"a": 2.0}},
-                "force_x_bias": "default",
-            },
-        )
-    )
+    unknown = {
+        **NOTHING,
+        "friction": {"half_normal": 0.5},
+        "lever": 0.01,
+        "moment_gain": {"choice": [0.9, 1.1]},
+        "noise_scale": {"gamma": {"a": 2.0}},
+        "force_x_bias": "default",
+    }
+    spec = read_specification(changed(PLAIN, records=400, shard_records=400, unknown=unknown))
     data = records_as_dataset(spec, generate_records(spec, 0, 400))
     assert "friction" not in data.attrs
     assert {n for n in data if str(n).startswith("truth_") and n[6:] in PARAMETERS} == {
@@ -137,12 +120,7 @@ def test_a_named_rig_is_as_its_tables(tmp_path):
     named, held = read_specification(tmp_path / "set.toml"), read_specification({**plain, "rig": rig})
     tables = {
         "rod": {"length": 0.1, "flexural_rigidity": 1e-4, "stem": 0.002},
-        "load_cell": {
-            "force_noise": 1e-3,
-            "moment_noise": 4e-5,
-            "lever_x": 0.001,
-            "frame": "turning",
-        },
+        "load_cell": {"force_noise": 1e-3, "moment_noise": 4e-5, "lever_x": 0.001, "frame": "turning"},
         "unknown": {"friction": {"half_normal": 0.2}, "lever": 0.0},
     }
     assert named.sha256 == held.sha256 == read_specification({**plain, **tables}).sha256
@@ -154,11 +132,9 @@ def test_a_named_rig_is_as_its_tables(tmp_path):
     assert read_specification(tmp_path / "set.toml").sha256 != named.sha256
 
 
-def test_a_rig_that_says_nothing_of_unknowns_has_those_of_a_real_rig():
-    """A specification that holds tables and says nothing of unknowns has none."""
-    rig = Rig(Rod(0.1, 1e-4), LoadCell(force_noise=1e-3, moment_noise=4e-5))
+def test_a_rig_that_says_nothing_of_unknowns_has_those_of_a_real_rig_and_tables_have_none():
     plain = {key: SI[key] for key in ("records", "seed", "contours")}
-    assert len(read_specification({**plain, "rig": rig}).unknown) == 9
+    assert len(read_specification({**plain, "rig": Rig(Rod(0.1, 1e-4), LoadCell())}).unknown) == 9
     assert read_specification(plain).unknown == {}
 
 

@@ -78,45 +78,15 @@ def test_readings_at_the_end_of_the_range_are_there_also_from_32_bits(limit, tmp
         assert np.count_nonzero(cell.cuts_off(readings)) == np.count_nonzero(np.abs(readings) == limit)
 
 
-def test_step_2_finds_the_contacts():
-    """Of a record without noise, the true ones."""
-    one = record(changed(RICH, precision=None, load_cell={"frame": "turning"}, unknown="nothing"), 4)
-    found = tb.reconstruct(one)
-    loaded = (found.status == "ok").values
-    assert np.count_nonzero(loaded) > 30
-    rod = one.attrs["rod_length"]
-    np.testing.assert_allclose(found.contact_x[loaded], one.truth_contact_x[loaded], rtol=0, atol=1e-4 * rod)
-    np.testing.assert_allclose(found.contact_y[loaded], one.truth_contact_y[loaded], rtol=0, atol=1e-4 * rod)
-
-
-def test_its_contour_is_the_one_that_was_touched():
-    """With a diameter the rod's surface touches it, in true contacts of every family."""
-    for spec in (PLAIN, SHAPES, changed(RICH, precision=None)):
-        one = record(spec, 2)
-        contour, touched = (
-            contour_of(one),
-            (one.truth_contact_phase != "none").values & np.isfinite(one.truth_contact_x),
-        )
-        x, y = contour.point(one.truth_slope_angle.values[touched])
-        length = one.attrs["rod_length"]
-        np.testing.assert_allclose(x, one.truth_contact_x.values[touched], rtol=0, atol=1e-9 * length)
-        np.testing.assert_allclose(y, one.truth_contact_y.values[touched], rtol=0, atol=1e-9 * length)
-
-
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("plain")
-    generate(PLAIN, folder, workers=1)
-    return folder
-
-
 @pytest.mark.parametrize("index", [-1, 24, 10**9, 1.0, "1", None])
-def test_a_number_that_there_is_not_is_refused(index, plain):
-    for source in (PLAIN, plain):
+def test_a_number_that_there_is_not_is_refused(index, plain_set):
+    for source in (PLAIN, plain_set):
         with refused(ParameterError, shown(index), "0 to 23"):
             record(source, index)
 
 
-def test_what_is_neither_folder_nor_file_is_not_found(tmp_path):
+def test_what_is_not_there_is_refused(tmp_path):
     with pytest.raises(FileNotFoundError):
         record(tmp_path / "nothing", 0)
+    with refused(ParameterError, "contour", "truth=True"):
+        contour_of(record(PLAIN, 0, truth=False))

@@ -14,6 +14,7 @@ from tactile_bayes.errors import SpecificationError
 from tactile_bayes.load_cell import OrnsteinUhlenbeck
 
 PARABOLA = {"family": "parabola", "a": 1.0, "q": 0.5}
+SHAPE_FREE = {"family": "shape-free", "r": 0.5, "amplitude": 0.5, "length_scale": 1.0, "q": 0.5}
 WORDS = """
 # what nobody reads
 name = "parabolas"
@@ -39,8 +40,12 @@ samples = 24
 """
 
 
-def contour(**changes):
-    return {"contours": [{**PARABOLA, **changes}]}
+def contour(family=PARABOLA, **changes):
+    return {"contours": [{**family, **changes}]}
+
+
+def of(family, **values):
+    return {"contours": [{"family": family, "q": 0.5, **values}]}
 
 
 @pytest.mark.parametrize("spec", [PLAIN, RICH])
@@ -62,11 +67,7 @@ def test_comments_layout_and_kinds_of_number_do_not_count(tmp_path):
     "change",
     [
         {"precision": "double", "each_contour": False, "description": "", "rod": {}},
-        {
-            "scan__margin": 0.1,
-            "scan__bases": [[0, 0]],
-            "scan__directions": ["forward", "backward"],
-        },
+        {"scan__margin": 0.1, "scan__bases": [[0, 0]], "scan__directions": ["forward", "backward"]},
         {"load_cell__frame": "fixed"},
         {"contours": [{**PLAIN["contours"][0], "weight": 1}]},
     ],
@@ -77,19 +78,10 @@ def test_defaults_that_are_written_out_do_not_count(change):
     assert read_specification(changed(flat, **contour(x_c=0.0))).sha256 == read_specification(flat).sha256
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"seed": 8},
-        {"records": 32},
-        {"shard_records": 4},
-        {"name": "other"},
-        {"scan__margin": 0.2},
-        {"precision": "single"},
-    ],
-)
-def test_what_is_said_counts(change):
-    assert read_specification(changed(PLAIN, **change)).sha256 != read_specification(PLAIN).sha256
+def test_what_is_said_counts():
+    changes = ({"seed": 8}, {"records": 32}, {"shard_records": 4}, {"name": "other"}, {"precision": "single"})
+    for change in (*changes, {"scan__margin": 0.2}):
+        assert read_specification(changed(PLAIN, **change)).sha256 != read_specification(PLAIN).sha256, change
 
 
 def test_numpy_numbers_and_tuples_are_taken():
@@ -124,30 +116,12 @@ REFUSED = [
     (contour(a={"choice": [1.0, 0.0]}), ["contours[0].a may be 0"]),
     (contour(a={"normal": [-1.0, 0.0]}), ["contours[0].a may be -1"]),
     ({"contours": [PARABOLA, {"family": "power-law", "w": 1.0, "n": 1.0, "q": 0.5}]}, ["contours[1].n is 1", "1.1"]),
-    (
-        {"contours": [{"family": "power-law", "w": 1.0, "n": {"log_uniform": [1.5, 80.0]}, "q": 0.5}]},
-        ["contours[0].n may be 80", "50"],
-    ),
-    (
-        {"contours": [{"family": "power-law", "a": {"uniform": [1.0, 2.0]}, "n": 3.0, "q": 0.5}]},
-        ["contours[0].a", "power-law", "w"],
-    ),
-    (
-        {"contours": [{"family": "parabola/power-law", "left_a": 5, "right_a": 1000, "right_n": 4, "q": 0.5}]},
-        ["contours[0].right_a", "power-law", "right_w", "0.1"],
-    ),
-    (
-        {"contours": [{"family": "shape-free", "radius": 0.5, "amplitude": 0.5, "length_scale": 1.0, "q": 0.5}]},
-        ["contours[0].radius", "shape-free", "r"],
-    ),
-    (
-        {"contours": [{"family": "ellipse/power-law", "left_a": 1, "left_b": 0, "right_w": 1, "right_n": 2, "q": 1}]},
-        ["contours[0].left_b is 0"],
-    ),
-    (
-        {"contours": [{"family": "shape-free", "r": 0.5, "amplitude": 0.5, "length_scale": 0.01, "q": 0.5}]},
-        ["contours[0].length_scale is 0.01", "0.15 to 4 rad"],
-    ),
+    (of("power-law", w=1.0, n={"log_uniform": [1.5, 80.0]}), ["contours[0].n may be 80", "50"]),
+    (of("power-law", a={"uniform": [1.0, 2.0]}, n=3.0), ["contours[0].a", "power-law", "w"]),
+    (of("parabola/power-law", left_a=5, right_a=1000, right_n=4), ["contours[0].right_a", "right_w", "0.1"]),
+    (of("shape-free", radius=0.5, amplitude=0.5, length_scale=1.0), ["contours[0].radius", "shape-free", "r"]),
+    (of("ellipse/power-law", left_a=1, left_b=0, right_w=1, right_n=2), ["contours[0].left_b is 0"]),
+    (contour(SHAPE_FREE, length_scale=0.01), ["contours[0].length_scale is 0.01", "0.15 to 4 rad"]),
     ({"contours": [{"family": ["circle"]}]}, ["contours[0].family is ['circle']"]),
     ({"contours": [PARABOLA, {"family": "square"}]}, ["contours[1].family is 'square'"]),
     ({"contours": [{"family": "parabola", "a": 1.0}]}, ["contours[0] is a parabola and has no q"]),
@@ -162,7 +136,6 @@ REFUSED = [
     (contour(q=True), ["contours[0].q is True"]),
     (contour(q={"uniform": [0.3, 0.5], "normal": [0, 1]}), ["contours[0].q is {"]),
     (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma'"]),
-    (contour(q={"uniform, log_uniform": [1, 2]}), ["contours[0].q has the distribution 'uniform, log_uniform'"]),
     (contour(q={"uniform": 0.3}), ["contours[0].q.uniform is 0.3"]),
     (contour(q={"choice": []}), ["contours[0].q.choice is []"]),
     (contour(q={"each": [1.0, "2"]}), ["contours[0].q.each is [1.0, '2']"]),
@@ -178,7 +151,6 @@ REFUSED = [
     ({"rod": {"rest_curvature": 4.0}}, ["rest_curvature", "half circle"]),
     ({"rod": {"taper": 1.0}}, ["rod.taper is 1", "0.95"]),
     ({"rod": {"taper": {"uniform": [-0.1, 0.5]}}}, ["rod.taper may be -0.1"]),
-    ({"rod": {"taper": {"each": [0.0, 0.5, 0.96]}}}, ["rod.taper may be 0.96"]),
     ({"rod": {"taper": {"log_normal": [0.5, 0.1]}}}, ["rod.taper may be unbounded"]),
     ({"rod": {"taper": "some"}}, ["rod.taper is 'some'"]),
     ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, ["rod.flexural_rigidity may be 0"]),
@@ -193,14 +165,13 @@ REFUSED = [
     ({"scan__samples": 1}, ["scan.samples is 1"]),
     ({"scan__margin": -0.1}, ["scan.margin is -0.1"]),
     ({"scan__from_degrees": 10}, ["scan.to_degrees is missing"]),
-    ({"scan__to_degrees": 10}, ["scan.from_degrees is missing"]),
     ({"scan__seed": 10}, ["there is no key 'scan.seed'", "top"]),
     ({"scan": {"from_degrees": 10, "to_degrees": 90, "margin": 0.1}}, ["from_degrees and to_degrees, and a margin"]),
     ({"scan": {"from_degrees": 90, "to_degrees": 10}}, ["scan.from_degrees is 90", "to_degrees, 10"]),
     ({"scan": {"from_degrees": -400, "to_degrees": 10}}, ["scan.from_degrees is -400"]),
     ({"scan__friction": 0.2}, ["there is no key 'scan.friction'", "[unknown]"]),
     ({"unknown": {"friction": 2.0}}, ["friction", "2.0", "0.8423"]),
-    ({"load_cell__noise": 1.0}, ["there is no key 'load_cell.noise'"]),
+    ({"load_cell__xyz": 1.0}, ["there is no key 'load_cell.xyz'", "frame"]),
     ({"load_cell__samples": 9}, ["there is no key 'load_cell.samples'", "[scan]"]),
     ({"load_cell__frce_noise": 9}, ["there is no key 'load_cell.frce_noise'", "'force_noise'"]),
     ({"load_cell__frame": "loose"}, ["load_cell.frame is 'loose'"]),
@@ -236,19 +207,11 @@ def test_a_refusal_names_the_file(tmp_path, content, named):
         read_specification(path)
 
 
-def test_what_no_toml_holds_is_refused():
+def test_what_no_toml_holds_and_a_missing_file_are_refused():
     with refused(SpecificationError, "specification", "NoneType"):
         read_specification({"records": None})
-
-
-def test_a_missing_file_is_that():
     with pytest.raises(FileNotFoundError):
         read_specification("no such file.toml")
-
-
-def test_a_key_of_no_table_is_refused_without_all_there_are():
-    with refused(SpecificationError, "'load_cell.xyz'", "frame"):
-        read_specification(changed(PLAIN, load_cell__xyz=1.0))
 
 
 def test_the_time_of_a_drift_is_stated_though_it_is_left_out():
@@ -260,28 +223,18 @@ def test_defaults():
     spec = read_specification({"records": 1, "seed": 0, "contours": [PARABOLA]})
     assert (spec.name, spec.description, spec.shard_records, spec.single) == ("unnamed", "", 500, False)
     assert spec.sweeps == ((0, "forward"), (0, "backward"))
-    assert (spec.drive.samples, spec.drive.margin, spec.friction, spec.frame, spec.units) == (
-        180,
-        0.1,
-        0.0,
-        "fixed",
-        "dimensionless",
-    )
+    assert (spec.drive.samples, spec.drive.margin, spec.friction) == (180, 0.1, 0.0)
+    assert (spec.frame, spec.units) == ("fixed", "dimensionless")
 
 
-def test_lists_alone_say_how_many_records_there_are():
-    each = contour(q={"each": [0.3, 0.4, 0.5]}, a={"each": [1.0, 2.0]})
-    spec = read_specification({"seed": 1, **each})
-    assert spec.records == 6
-    assert spec.lists == (("contours[0].a", 2), ("contours[0].q", 3))
-
-
-def test_lists_on_one_axis_advance_in_step():
-    levels = {"each": [0.01, 0.02, 0.05], "axis": "noise"}
+def test_lists_alone_say_how_many_records_there_are_and_on_one_axis_advance_in_step():
     table = {
         "seed": 1,
         **contour(q={"each": [0.3, 0.4]}),
-        "load_cell": {"force_noise": levels, "moment_noise": {"each": [0.1, 0.2, 0.5], "axis": "noise"}},
+        "load_cell": {
+            "force_noise": {"each": [0.01, 0.02, 0.05], "axis": "noise"},
+            "moment_noise": {"each": [0.1, 0.2, 0.5], "axis": "noise"},
+        },
     }
     spec = read_specification(table)
     assert spec.lists == (("contours[0].q", 2), ("noise", 3))
@@ -290,14 +243,8 @@ def test_lists_on_one_axis_advance_in_step():
     np.testing.assert_array_equal(drawn["contours[0].q"], np.repeat([0.3, 0.4], 3))
     np.testing.assert_array_equal(drawn["load_cell.force_noise"], np.tile([0.01, 0.02, 0.05], 2))
     np.testing.assert_array_equal(drawn["load_cell.moment_noise"], np.tile([0.1, 0.2, 0.5], 2))
-
-
-def test_lists_on_one_axis_are_equally_long():
-    load_cell = {
-        "force_noise": {"each": [0.01, 0.02], "axis": "noise"},
-        "moment_noise": {"each": [0.1, 0.2, 0.5], "axis": "noise"},
-    }
+    table["load_cell"]["force_noise"] = {"each": [0.01, 0.02], "axis": "noise"}
     with refused(SpecificationError, "load_cell.moment_noise", 3, "'noise'", 2):
-        read_specification({"seed": 1, **contour(), "load_cell": load_cell})
+        read_specification(table)
     with refused(SpecificationError, "load_cell.force_noise.axis", 3):
         read_specification({"seed": 1, **contour(), "load_cell": {"force_noise": {"each": [0.1], "axis": 3}}})

@@ -1,8 +1,8 @@
 """Every kind of damage to a data set is found, and the file named."""
 
-import dataclasses
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,24 +10,14 @@ import pytest
 from helpers.data_sets import PLAIN
 from helpers.refusals import refused
 from tactile_bayes.datasets import generate, verify
+from tactile_bayes.datasets import manifest as manifest_module
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
 from tactile_bayes.errors import ParameterError, SpecificationError
 
 
-@pytest.fixture(scope="module")
-def original(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("original")
-    generate(PLAIN, folder, workers=1)
-    return folder
-
-
-@pytest.fixture
-def folder(original, tmp_path):
-    return shutil.copytree(original, tmp_path / "copy")
-
-
 def test_what_is_whole_is_so(folder):
+    (folder / "notes.txt").write_text("of no data set, and left alone")
     manifest = verify(folder)
     assert manifest.is_complete
     assert manifest.records == 24
@@ -49,17 +39,16 @@ def test_one_flipped_bit_anywhere_is_found(folder, name):
     verify(folder)
 
 
+CUTS = {"short": lambda c: c[:-1], "long": lambda c: c + b"\0", "empty": lambda c: b"", "missing": None}
+
+
 @pytest.mark.parametrize("name", ["shard-000001.nc", "README.md", "manifest.json"])
-@pytest.mark.parametrize("cut", [lambda c: c[:-1], lambda c: c + b"\0", lambda c: b""], ids=["short", "long", "empty"])
+@pytest.mark.parametrize("cut", CUTS)
 def test_another_length_is_found(folder, name, cut):
-    (folder / name).write_bytes(cut((folder / name).read_bytes()))
-    with refused(SpecificationError, name):
-        verify(folder)
-
-
-@pytest.mark.parametrize("name", ["shard-000001.nc", "README.md", "manifest.json"])
-def test_a_missing_file_is_found(folder, name):
-    (folder / name).unlink()
+    if cut == "missing":
+        (folder / name).unlink()
+    else:
+        (folder / name).write_bytes(CUTS[cut]((folder / name).read_bytes()))
     with refused(SpecificationError, name):
         verify(folder)
 
@@ -70,17 +59,9 @@ def test_a_shard_too_many_is_found(folder):
         verify(folder)
 
 
-def test_other_files_are_nobodys_business(folder):
-    (folder / "notes.txt").write_text("mine")
-    verify(folder)
-
-
 @pytest.mark.parametrize(
     "edit",
     [
-        lambda t: t | {"seed": 8},
-        lambda t: t | {"redrawn": {"out of reach": 3}},
-        lambda t: t | {"specification": t["specification"].replace("seed", "Seed")},
         lambda t: t | {"shards": t["shards"][:2]},
         lambda t: dict(sorted(t.items())),
         lambda t: {k: v for k, v in t.items() if k != "sha256"},
@@ -109,29 +90,19 @@ def test_progress_is_told(folder):
     assert told == [(files, 5) for files in range(1, 6)]
 
 
-def test_a_specification_that_is_not_the_stated_one_is_found(folder):
+def test_a_manifest_that_is_of_no_use_says_why(folder):
     manifest = read_manifest(folder)
-    write_manifest(type(manifest)(**{**vars(manifest), "specification_sha256": "0" * 64}), folder)
+    write_manifest(replace(manifest, specification_sha256="0" * 64), folder)
     with refused(SpecificationError, "manifest.json", "specification_sha256", "put a copy of it back"):
         verify(folder)
-
-
-def test_a_manifest_of_another_format_says_so(folder):
-    from tactile_bayes.datasets import manifest as module
-
-    path = folder / "manifest.json"
-    table = json.loads(path.read_text())
-    table.pop("sha256")
-    path.write_bytes(module._content(table | {"format": 99}))
-    with refused(SpecificationError, "format 99"):
-        verify(folder)
-
-
-def test_what_is_not_complete_says_so(folder):
-    manifest = read_manifest(folder)
-    write_manifest(type(manifest)(**{**vars(manifest), "shards": manifest.shards[:2], "card_sha256": ""}), folder)
+    write_manifest(replace(manifest, shards=manifest.shards[:2], card_sha256=""), folder)
     (folder / "shard-000002.nc").unlink()
     with refused(SpecificationError, "16 of 24"):
+        verify(folder)
+    table = json.loads((folder / "manifest.json").read_text())
+    table.pop("sha256")
+    (folder / "manifest.json").write_bytes(manifest_module._content(table | {"format": 99}))
+    with refused(SpecificationError, "format 99"):
         verify(folder)
 
 
@@ -154,7 +125,7 @@ def test_counts_that_come_out_otherwise_are_found(folder, change):
     """Each is possible, and only another generation knows better."""
     manifest = read_manifest(folder)
     shards = (manifest.shards[0]._replace(**change), *manifest.shards[1:])
-    write_manifest(dataclasses.replace(manifest, shards=shards), folder)
+    write_manifest(replace(manifest, shards=shards), folder)
     verify(folder)
     with refused(SpecificationError, "shard-000000.nc", *change):
         verify(folder, regenerate=1)
@@ -167,11 +138,11 @@ def test_no_number_of_shards_is_refused(folder, count):
 
 
 @pytest.mark.parametrize("name", ["shard-000001.nc", "README.md"])
-def test_what_is_damaged_is_mended_as_the_refusal_says(folder, original, name):
+def test_what_is_damaged_is_mended_as_the_refusal_says(folder, plain_set, name):
     (folder / name).write_bytes(b"damaged")
     with refused(SpecificationError, name, "delete it"):
         verify(folder)
     (folder / name).unlink()
     generate(PLAIN, folder, workers=1)
     verify(folder)
-    assert (folder / name).read_bytes() == (original / name).read_bytes()
+    assert (folder / name).read_bytes() == (plain_set / name).read_bytes()

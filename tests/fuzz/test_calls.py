@@ -11,7 +11,8 @@ import xarray as xr
 from matplotlib import pyplot as plt
 
 import tactile_bayes as tb
-from helpers.public_calls import AcceptedError, end_before_sampling, right_calls
+from helpers.pages import ROOT
+from helpers.public_calls import AcceptedError
 from helpers.public_names import public
 from helpers.refusals import refused
 from helpers.wrong_values import MORE, RESULTS, WRONG
@@ -19,7 +20,6 @@ from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
 from tactile_bayes.tasks import Workers
 
-ROOT = Path(__file__).parents[2]
 # Bases, results, and parts of the forward model that its own code alone calls.
 NOT_CALLED = {
     *(f"contours.{name}" for name in ("Contour", "Graph", "Single", "Locus")),
@@ -28,6 +28,8 @@ NOT_CALLED = {
     *(f"elastica.{name}" for name in ("Contact", "Wrench", "forward_contacts", "lever_of_stem")),
 }
 OF_ANY_NAME = ("Family", "Family.only", "Rig.with_unknown")  # what takes parameters of a contour or a rig by name
+pytestmark = pytest.mark.usefixtures("before_sampling")
+
 MOST_OBSCURE = 0.02  # largest share of wrong calls that end in an error of another library
 PARTS = 10  # parts of all wrong calls, of which each seed of the day makes one
 
@@ -40,8 +42,8 @@ def a_kind(*kinds):
     return lambda value: value is None or isinstance(value, kinds)
 
 
-def callable_or_none(value):
-    return value is None or callable(value)
+def a_seed(value):
+    return (type(value) is int and value >= 0) or isinstance(value, np.random.Generator | np.random.SeedSequence)
 
 
 # What an accepted value of an argument can be: of one function, or wherever it is an argument.
@@ -49,16 +51,16 @@ SENSIBLE = {
     "probability": lambda value: value is None or a_number(1e-323, 1.0 - 1e-16)(value),
     "false_alarm": a_number(1e-323, 1.0 - 1e-16),
     "friction": lambda value: value is None or a_number(0.0, 100.0)(value) or hasattr(value, "logpdf"),
-    "rng": lambda value: (
-        (type(value) is int and value >= 0) or isinstance(value, (np.random.Generator, np.random.SeedSequence))
+    "rng": a_seed,
+    **dict.fromkeys(
+        ("paper_figures.figure(rng)", "paper_figures.caption(rng)"), lambda value: value is None or a_seed(value)
     ),
-    "paper_figures.figure(rng)": lambda value: value is None or SENSIBLE["rng"](value),
-    "paper_figures.caption(rng)": lambda value: value is None or SENSIBLE["rng"](value),
     "workers": lambda value: value is None or isinstance(value, str | Workers) or (type(value) is int and value > 0),
     "rod": a_kind(tb.Rod),
     "load_cell": a_kind(tb.LoadCell),
     "rig": a_kind(tb.Rig),
     "settings": a_kind(tb.SamplerSettings),
+    "datasets.record(truth)": lambda value: isinstance(value, bool | np.bool_),
     "truth": a_kind(tb.contours.Contour, tb.Rig, tb.calibration.Misspecification),
     "posterior": a_kind(xr.DataTree, xr.Dataset),
     "record": a_kind(xr.Dataset),
@@ -66,29 +68,14 @@ SENSIBLE = {
     "ax": a_kind(),
     "path": a_kind(str, Path),
     "out": a_kind(str, Path),
-    **dict.fromkeys(("progress", "keep", "stop"), callable_or_none),
+    **dict.fromkeys(("progress", "keep", "stop"), lambda value: value is None or callable(value)),
     "plotting.pairs(truth)": lambda value: value is None or (isinstance(value, dict) and set(value) <= {"a", "q"}),
 }
-
-
-def sensible(name, argument):
-    return SENSIBLE.get(f"{name}({argument})", SENSIBLE.get(argument, lambda value: True))
-
-
-@pytest.fixture(scope="module")
-def calls(tmp_path_factory):
-    return right_calls(tmp_path_factory.mktemp("calls"))
 
 
 @pytest.fixture(scope="module")
 def wrong():
     return [*WRONG, *MORE, *(make() for make in RESULTS)]
-
-
-@pytest.fixture(autouse=True)
-def before_sampling(monkeypatch, tmp_path):
-    end_before_sampling(monkeypatch)
-    monkeypatch.chdir(tmp_path)
 
 
 def outcome(call, argument, value):
@@ -113,10 +100,6 @@ def outcome(call, argument, value):
     return "fine"
 
 
-def public_names():
-    return [label for module, name, label in public() if callable(getattr(module, name)) and label not in NOT_CALLED]
-
-
 def names_on_first_pages():
     """Names that README, the tutorial and the notebooks call."""
     pages = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", *(ROOT / "notebooks").glob("*.ipynb")]
@@ -130,7 +113,8 @@ def is_on_first_pages(name, names, methods):
 
 
 def test_every_public_name_is_called(calls):
-    assert set(public_names()) <= set(calls)
+    names = {label for module, name, label in public() if callable(getattr(module, name))}
+    assert names - NOT_CALLED <= set(calls)
 
 
 @pytest.mark.slow
@@ -164,7 +148,8 @@ def test_a_wrong_argument_gets_a_clear_error(calls, wrong, fuzz_seed, request):
         if found not in ("fine", "clear"):
             kept = worst if is_on_first_pages(name, *first_pages) else obscure
             kept.append(f"{name}({argument}={shown(value)}): {found}")
-        elif found == "fine" and not sensible(name, argument)(value):
+        is_sensible = SENSIBLE.get(f"{name}({argument})", SENSIBLE.get(argument, lambda value: True))
+        if found == "fine" and not is_sensible(value):
             nonsense.append(f"{name}({argument}={shown(value)})")
     assert not nonsense, "accepted: " + "\n".join(nonsense)
     assert not worst, "of the first pages:\n" + "\n".join(worst)

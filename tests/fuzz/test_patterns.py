@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 import time
+from pathlib import Path
 from re import _constants as codes
 from re import _parser as parser
 
@@ -46,24 +47,20 @@ def patterns():
     """Each pattern, and the methods it is used with."""
     found = {}
     for module in pkgutil.walk_packages(tactile_bayes.__path__, "tactile_bayes."):
-        path = importlib.util.find_spec(module.name).origin
-        with open(path, encoding="utf-8") as file:
-            text = file.read()
+        path = Path(importlib.util.find_spec(module.name).origin)
+        text = path.read_text(encoding="utf-8")
         if "import re\n" not in text:
             continue
         names = vars(importlib.import_module(module.name))
         compiled = {name: value.pattern for name, value in names.items() if isinstance(value, re.Pattern)}
         for node in ast.walk(ast.parse(text)):
-            if not (isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)):
-                continue
-            if node.value.id in compiled and node.attr in METHODS:
-                found.setdefault(compiled[node.value.id], set()).add(node.attr)
-        for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.Call) and ast.unparse(node.func) in {
-                f"re.{name}" for name in METHODS | {"compile"}
-            }:
-                first = eval(compile(ast.Expression(node.args[0]), path, "eval"), _Blanks(names))
-                found.setdefault(getattr(first, "pattern", first), set()).add(node.func.attr)
+            match node:
+                case ast.Attribute(value=ast.Name(id=name), attr=method) if name in compiled and method in METHODS:
+                    found.setdefault(compiled[name], set()).add(method)
+                case ast.Call(func=ast.Attribute(value=ast.Name(id="re"), attr=method), args=[first, *_]):
+                    if method in METHODS | {"compile"}:
+                        given = eval(compile(ast.Expression(first), path, "eval"), _Blanks(names))
+                        found.setdefault(getattr(given, "pattern", given), set()).add(method)
     return found
 
 
@@ -98,21 +95,23 @@ def _is_in(sign, items):
     )
 
 
+def _inner(code, value):
+    """Patterns in an item of a pattern."""
+    if code in REPEATS:
+        return [value[2]]
+    if code is codes.SUBPATTERN:
+        return [value[3]]
+    if code is codes.ATOMIC_GROUP:
+        return [value]
+    return value[1] if code is codes.BRANCH else []
+
+
 def parts(tree):
     """Yield (text before, what is repeated) for each repetition; return the shortest text with all that is optional."""
     before = ""
     for code, value in tree:
-        inner = []
-        if code in REPEATS:
-            inner = [value[2]]
-        elif code is codes.SUBPATTERN:
-            inner = [value[3]]
-        elif code is codes.ATOMIC_GROUP:
-            inner = [value]
-        elif code is codes.BRANCH:
-            inner = value[1]
         made = _of(code, value)[:1]
-        for number, branch in enumerate(inner):
+        for number, branch in enumerate(_inner(code, value)):
             one = ""
             for piece in parts(branch):
                 if isinstance(piece, str):
@@ -121,16 +120,11 @@ def parts(tree):
                     yield before + piece[0], piece[1]
             if code in REPEATS and value[1] > 1:
                 yield before, one
-                for sign in _signs(branch):
-                    yield before, sign
+                yield from {(before, sign) for item in branch for sign in _of(*item)[:12]}
             if number == 0:
                 made = one
         before += made
     yield before
-
-
-def _signs(tree):
-    return {sign for code, value in tree for sign in _of(code, value)[:12]}
 
 
 def attacks(pattern):
@@ -170,7 +164,7 @@ def slowest(pattern, methods):
 
 
 @pytest.mark.parametrize(
-    ("pattern", "methods"), [(pattern, sorted(methods)) for pattern, methods in patterns().items()], ids=repr
+    ("pattern", "methods"), [(one, sorted(methods)) for one, methods in patterns().items()], ids=repr
 )
 def test_a_pattern_takes_linear_time(pattern, methods):
     taken, text = slowest(pattern, set(methods))

@@ -30,6 +30,7 @@ NAMES = ("contact_x", "contact_y", "slope_angle")
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=0.01)
 EXACT_ANGLE = LoadCell(force_noise=0.05, moment_noise=0.02)
 ROD = Rod(length=0.1, flexural_rigidity=1.2e-5, diameter=0.003)
+SUMS, REACH = 4, 6.0  # number of independent sums, and extent of their grids [standard deviations]
 SI_CELL = LoadCell(force_noise=0.05 * ROD.force_unit, moment_noise=0.02 * ROD.moment_unit, drive_angle_noise=0.01)
 
 
@@ -139,10 +140,10 @@ class Sample:
         return np.stack([x * self.length, y * self.length, slope], axis=-1)
 
 
-def _jittered(rng, cells, reach):
-    """One random point in every cell of a grid over [-reach, reach]^d, shape (product of cells, d)."""
+def _jittered(rng, cells):
+    """One random point in every cell of a grid over [-REACH, REACH]^d, shape (product of cells, d)."""
     corners = np.stack(np.meshgrid(*(np.arange(n) for n in cells), indexing="ij"), axis=-1).reshape(-1, len(cells))
-    return reach * (2.0 * (corners + rng.random(corners.shape)) / np.array(cells) - 1.0)
+    return REACH * (2.0 * (corners + rng.random(corners.shape)) / np.array(cells) - 1.0)
 
 
 def contact_points(polar):
@@ -158,16 +159,16 @@ def contact_points(polar):
     return points, np.log(np.where(inside, rho, 1.0)) + np.where(inside, 0.0, -np.inf)
 
 
-def located(sample: Sample, phase, rng, angle_noise=None, log_prior=None, reach=6.0, cells=24):
+def located(sample: Sample, phase, rng, angle_noise=None, log_prior=None):
     """Mean and root of the covariance of one phase's part in (ρ, ϑ, slope), or None if there is no such contact.
 
     From sums for noise that shrinks to its size.
     """
-    centre, root = np.array([0.5, 0.5 * np.pi, 0.0]), np.diag([0.5, 0.5 * np.pi, 0.5 * np.pi]) / reach
+    centre, root = np.array([0.5, 0.5 * np.pi, 0.0]), np.diag([0.5, 0.5 * np.pi, 0.5 * np.pi]) / REACH
     widening = 64.0
     while True:
         for _ in range(2):
-            polar = centre + _jittered(rng, (cells,) * 3, reach) @ root.T
+            polar = centre + _jittered(rng, (24,) * 3) @ root.T
             points, volume = contact_points(polar)
             logs, found = sample.log_likelihood(points, widening, angle_noise)
             logs = np.where(found == phase, logs + volume, -np.inf)
@@ -184,44 +185,42 @@ def located(sample: Sample, phase, rng, angle_noise=None, log_prior=None, reach=
         widening /= 2.0
 
 
-def _by_phase(sample, sums, rng, one_sum, **options) -> Summary:
+def _by_phase(sample, one_sum, **options) -> Summary:
     """Each phase has a grid of its own: in weak contacts one of them is a thin layer beside the other."""
-    parts = [[] for _ in range(sums)]
+    rng, parts = np.random.default_rng(1), [[] for _ in range(SUMS)]
     for phase in (TIP, TANGENTIAL):
         place = located(sample, phase, rng, **options)
         for part in parts if place is not None else []:
-            surface, logs, found = one_sum(*place)
+            surface, logs, found = one_sum(rng, *place)
             part.append((surface, np.where(found == phase, logs, -np.inf), found == TANGENTIAL))
     return _summary([tuple(np.concatenate(column) for column in zip(*part, strict=True)) for part in parts])
 
 
-def posterior(sample: Sample, *, log_prior=None, cells=26, sums=4, seed=1, reach=6.0) -> Summary:
+def posterior(sample: Sample, *, log_prior=None, cells=26) -> Summary:
     """Over the three dimensions of contacts, with an encoder that is not exact; prior flat or as given."""
-    rng = np.random.default_rng(seed)
 
-    def one_sum(centre, root):
-        points, volume = contact_points(centre + _jittered(rng, (cells,) * 3, reach) @ root.T)
+    def one_sum(rng, centre, root):
+        points, volume = contact_points(centre + _jittered(rng, (cells,) * 3) @ root.T)
         logs, found = sample.log_likelihood(points)
         surface, logs = sample.surface(points), logs + volume + np.log(np.diag(root)).sum()
         if log_prior is not None:
             logs = logs + log_prior(*surface.T)
         return surface, logs, found
 
-    return _by_phase(sample, sums, rng, one_sum, log_prior=log_prior)
+    return _by_phase(sample, one_sum, log_prior=log_prior)
 
 
-def posterior_at_exact_angle(sample: Sample, *, cells=100, sums=4, seed=1, reach=6.0) -> Summary:
+def posterior_at_exact_angle(sample: Sample, *, cells=100) -> Summary:
     """Over the surface of contacts with the drive angle that was read, a grid over ρ and slope − ϑ.
 
     When contact point and slope are turned about the pivot, the drive angle turns with them: ∂φ0/∂ϑ = 1 at a given
     slope − ϑ, and the flat prior on the surface is ρ dρ d(slope − ϑ).
     """
-    rng = np.random.default_rng(seed)
     to_plane = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0]])
 
-    def one_sum(centre, root):
+    def one_sum(rng, centre, root):
         plane = np.linalg.cholesky(to_plane @ root @ root.T @ to_plane.T)
-        rho, lean = (to_plane @ centre + _jittered(rng, (cells, cells), reach) @ plane.T).T
+        rho, lean = (to_plane @ centre + _jittered(rng, (cells, cells)) @ plane.T).T
         somewhere = np.stack([rho, np.full(rho.size, centre[1]), centre[1] + lean], axis=-1)
         there = sample.wrench(*contact_points(somewhere)[0].T).drive_angle
         turn = np.where(np.isnan(there), 0.0, sample.angle - there)
@@ -231,27 +230,26 @@ def posterior_at_exact_angle(sample: Sample, *, cells=100, sums=4, seed=1, reach
         logs[np.isnan(there) | np.isnan(logs)] = -np.inf
         return sample.surface(points), logs, wrench.phase
 
-    return _by_phase(sample, sums, rng, one_sum, angle_noise=2e-3)
+    return _by_phase(sample, one_sum, angle_noise=2e-3)
 
 
-def posterior_by_roots(sample: Sample, *, cells=50, slopes=32, sums=4, seed=1, reach=6.0, steps=40) -> Summary:
+def posterior_by_roots(sample: Sample, *, cells=50) -> Summary:
     """The same over the plane of contact points: slopes that give the drive angle, each with density 1 / |∂φ0/∂α|.
 
     Roots are looked for between neighbours of a list of slopes at which the drive angle passes the one that was read.
     """
-    rng = np.random.default_rng(seed)
 
-    def one_sum(centre, root):
+    def one_sum(rng, centre, root):
         plane, deviation = np.linalg.cholesky((root @ root.T)[:2, :2]), np.sqrt((root[2] ** 2).sum())
-        slope = centre[2] + deviation * np.linspace(-8.0, 8.0, slopes)
+        slope = centre[2] + deviation * np.linspace(-8.0, 8.0, 32)
         slope = slope[np.abs(slope) < 0.5 * np.pi]
-        polar = centre[:2] + _jittered(rng, (cells, cells), reach) @ plane.T
+        polar = centre[:2] + _jittered(rng, (cells, cells)) @ plane.T
         points, volume = contact_points(np.column_stack([polar, np.zeros(len(polar))]))
         off = sample.wrench(points[:, :1], points[:, 1:2], slope).drive_angle - sample.angle
         where, k = np.nonzero(off[:, :-1] * off[:, 1:] <= 0.0)  # the drive angle is continuous between the phases
         x, y = points[where, :2].T
         low, high, below = slope[k], slope[k + 1], off[where, k]
-        for _ in range(steps):
+        for _ in range(40):
             half = 0.5 * (low + high)
             left = below * (sample.wrench(x, y, half).drive_angle - sample.angle) > 0.0
             low, high = np.where(left, half, low), np.where(left, high, half)
@@ -261,7 +259,7 @@ def posterior_by_roots(sample: Sample, *, cells=50, slopes=32, sums=4, seed=1, r
         logs[~np.isfinite(logs)] = -np.inf
         return sample.surface(np.stack([x, y, low], axis=-1)), logs, found.phase
 
-    return _by_phase(sample, sums, rng, one_sum, angle_noise=2e-3)
+    return _by_phase(sample, one_sum, angle_noise=2e-3)
 
 
 def _summary(parts) -> Summary:
@@ -291,9 +289,9 @@ def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", frict
     return ContactDensity(samples, readings, base, **options).take(np.atleast_1d(which))
 
 
-def weighed_moments(density: ContactDensity, draws=16000, seed=1):
+def weighed_moments(density: ContactDensity):
     """The ten numbers of each sample from weighted proposals, and the number of draws that these are worth."""
-    weights = weigh_contacts(density, draws, np.random.SeedSequence(seed))
+    weights = weigh_contacts(density, 16_000, np.random.SeedSequence(1))
     coordinates, _ = density.unfold(weights.points.swapaxes(1, 2))
     places, tangential = density.contacts(coordinates)[:3], weights.points[:, 0] < 0.0
     each = []

@@ -71,19 +71,23 @@ def vertex_joints(draw) -> Contour:
     return Joined(half(), half())
 
 
-@st.composite
-def edges(draw) -> Contour:
-    """Two parabolas that cross, with an edge between them."""
-    x, y = draw(st.floats(-0.5, 0.5)), draw(st.floats(0.05, 0.8))
-    before = draw(st.floats(-1.2, 1.0))
-    after = min(before + draw(st.floats(1e-3, 2.0)), 1.3)
+def edge(x: float, y: float, slope_angles: tuple[float, float], sizes: tuple[float, float]) -> Contour:
+    """Two parabolas that cross at a point, with an edge there, each with its slope angle and its size."""
 
-    def half(slope_angle: float) -> Parabola:
-        a = draw(log_uniform(0.05, 10.0))
+    def half(slope_angle: float, a: float) -> Parabola:
         x_c = x - np.tan(slope_angle) / (2.0 * a)
         return Parabola(a, y - a * (x - x_c) ** 2, x_c)
 
-    return Joined(half(before), half(after), x=x)
+    return Joined(*map(half, slope_angles, sizes), x=x)
+
+
+@st.composite
+def edges(draw) -> Contour:
+    """Edges between parabolas."""
+    x, y = draw(st.floats(-0.5, 0.5)), draw(st.floats(0.05, 0.8))
+    before = draw(st.floats(-1.2, 1.0))
+    after = min(before + draw(st.floats(1e-3, 2.0)), 1.3)
+    return edge(x, y, (before, after), (draw(log_uniform(0.05, 10.0)), draw(log_uniform(0.05, 10.0))))
 
 
 @st.composite

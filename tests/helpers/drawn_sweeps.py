@@ -3,16 +3,8 @@
 import numpy as np
 
 import tactile_bayes as tb
-from tactile_bayes.contours import (
-    Circle,
-    Contour,
-    Ellipse,
-    Joined,
-    Parabola,
-    PowerLaw,
-    from_function,
-    from_points,
-)
+from helpers.contours_drawn import edge
+from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw, from_function, from_points
 from tactile_bayes.sweep.drive import Carried
 
 
@@ -29,25 +21,15 @@ def contour(rng: np.random.Generator) -> Contour:
         case 3:
             return PowerLaw(np.exp(rng.uniform(-1.0, 1.5)), rng.uniform(1.4, 4.0), q, x_c)
         case 4:
-            return _edge(rng, x_c, q)
+            before, size = rng.uniform(-1.2, 0.8), np.exp(rng.uniform(-1.5, 1.0))
+            after, other = min(before + rng.uniform(0.1, 1.8), 1.3), np.exp(rng.uniform(-1.5, 1.0))
+            return edge(x_c, q, (before, after), (size, other))
         case 5:
             a, ends = rng.uniform(0.3, 2.0), x_c + np.array([-1.0, 1.0]) * rng.uniform(0.3, 1.0, 2)
             return from_function(lambda x: q + a * (np.cosh(x - x_c) - 1.0), ends)
         case _:
             x = np.sort(rng.uniform(x_c - rng.uniform(0.4, 1.0), x_c + rng.uniform(0.4, 1.0), 40))
             return from_points(x, q + rng.uniform(0.3, 2.0) * (x - x_c) ** 2)
-
-
-def _edge(rng: np.random.Generator, x: float, y: float) -> Contour:
-    """Two parabolas that cross, with an edge between them."""
-    before = rng.uniform(-1.2, 0.8)
-
-    def half(slope_angle: float) -> Parabola:
-        a = np.exp(rng.uniform(-1.5, 1.0))
-        x_c = x - np.tan(slope_angle) / (2.0 * a)
-        return Parabola(a, y - a * (x - x_c) ** 2, x_c)
-
-    return Joined(half(before), half(min(before + rng.uniform(0.1, 1.8), 1.3)), x=x)
 
 
 def rod(rng: np.random.Generator, bend: float = 0.6) -> tb.Rod:
@@ -67,9 +49,9 @@ def rod(rng: np.random.Generator, bend: float = 0.6) -> tb.Rod:
             return tb.Rod(rest_curvature=lambda s: curved * (0.3 + s), taper=float(rng.uniform(0.0, 0.6)), stem=stem)
 
 
-def carried_drive(rng: np.random.Generator, poses: int | None = None) -> Carried:
+def carried_drive(rng: np.random.Generator) -> Carried:
     """A drive that carries the base past the object, along one line or several."""
-    count = int(rng.integers(2, 5)) if poses is None else poses
+    count = int(rng.integers(2, 5))
     side = rng.choice([-1.0, 1.0])
     x = side * np.linspace(rng.uniform(0.5, 1.5), -rng.uniform(0.3, 1.5), count)
     y = rng.uniform(-0.6, 0.2) + rng.uniform(-0.3, 0.3, count)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from helpers.exact_rod import HALF, QUARTER, complementary_arc, mp
+from helpers.exact_rod import HALF, elastica, mp
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw, ShapeFree
 from tactile_bayes.mechanics.paths import States
 
@@ -327,7 +327,7 @@ class ExactPath:
         return x * cos + y * sin, y * cos - x * sin, alpha
 
     def _state(self, i: int, p: Number, tip: bool, rod: list[Number]) -> ExactState:
-        tau, a, b, turned = _elastica(rod[0], rod[1] if tip else mp.mpf(0))
+        tau, a, b, turned = elastica(rod[0], rod[1] if tip else mp.mpf(0))
         u, v, alpha = self._frame(i, p)
         arclength = mp.mpf(1) if tip else mp.hypot(u, v) * tau / mp.hypot(a, b)
         force = (tau / arclength) ** 2
@@ -349,7 +349,7 @@ class ExactPath:
         def miss(z: list[Number]) -> list[Number]:
             p, *rod = z if parameter is None else [parameter, *z]
             end = psi1 if psi1 is not None else rod[1] if tip else mp.mpf(0)
-            tau, a, b, turned = _elastica(rod[0], end)
+            tau, a, b, turned = elastica(rod[0], end)
             u, v, alpha = self._frame(i, p)
             lies = [a / tau - u, b / tau - v] if tip else [(a * v - b * u) / tau]
             return lies if angle is None else [*lies, alpha + turned - angle]
@@ -365,10 +365,3 @@ class ExactPath:
             if mp.norm(step, mp.inf) < SETTLED:
                 return unknown
         raise ArithmeticError("Newton's method does not settle")
-
-
-def _elastica(theta: Number, psi1: Number) -> tuple[Number, Number, Number, Number]:
-    """√f s1, √f times contact along and across the contour, φ0 − α: DESIGN.md, section 2."""
-    k = mp.sin(QUARTER - psi1 / 2)
-    tau, e = complementary_arc(theta, k * k)
-    return tau, 2 * k * mp.cos(theta), 2 * e - tau, HALF - 2 * mp.asin(k * mp.sin(theta))

@@ -53,12 +53,14 @@ def complementary_arc(theta: Number, m: Number) -> tuple[Number, Number]:
     return difference, difference * (1 - squares) - sines
 
 
-@lru_cache(maxsize=4096)
-def _elastica(theta: Number, psi1: Number) -> tuple[Number, Number, Number, Number]:
-    """√f s1, √f u, √f v, φ0 − β."""
+def elastica(theta: Number, psi1: Number) -> tuple[Number, Number, Number, Number]:
+    """√f s1, √f times the contact along β and across it, φ0 − β: DESIGN.md, section 2."""
     k = mp.sin(QUARTER - psi1 / 2)
     tau, e = complementary_arc(theta, k * k)
     return tau, 2 * k * mp.cos(theta), 2 * e - tau, HALF - 2 * mp.asin(k * mp.sin(theta))
+
+
+_elastica = lru_cache(maxsize=4096)(elastica)
 
 
 def _legendre_angle(amplitude: Number, psi1: Number) -> Number:

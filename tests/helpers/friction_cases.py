@@ -14,18 +14,17 @@ from helpers.friction_stepper import Drive, contour_of
 _BASE = 0.15  # least distance of the base from the object, over the object's size
 
 
-def drawn_case(rng: np.random.Generator, *, rod: str | None = None, drive: str | None = None) -> dict[str, Any]:
+def drawn_case(rng: np.random.Generator) -> dict[str, Any]:
     """A case whose rod is free at first and touches on the first leg of a drive that turns back up to twice.
 
-    `rod` is "straight", "tapered", "curved" or "both"; `drive` is "turned", "carried", "upright" or "moved"; both are
-    drawn if not given. The contour lies above the base.
+    The contour lies above the base.
     """
     while True:
-        kind = rod or rng.choice(["straight", "tapered", "curved", "both"])
+        kind = rng.choice(["straight", "tapered", "curved", "both"])
         taper = rng.uniform(0.2, 0.8) if kind in ("tapered", "both") else 0.0
         curvature = rng.uniform(-0.5, 0.5, 2) if kind in ("curved", "both") else np.zeros(1)
         contour = _drawn_contour(rng)
-        side, how = rng.choice([-1.0, 1.0]), drive or rng.choice(["turned", "carried", "upright", "moved"])
+        side, how = rng.choice([-1.0, 1.0]), rng.choice(["turned", "carried", "upright", "moved"])
         angle = 0.5 * math.pi - side * rng.uniform(0.0, 0.9) * (how != "upright")
         far = [side * 0.9, rng.uniform(-0.3, 0.2), angle]
         move = np.array([-1.8 * side, rng.uniform(-0.3, 0.3), side * rng.uniform(-0.6, 1.0)])

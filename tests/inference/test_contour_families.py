@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 
-from helpers.contour_posteriors import assert_near, infer_as_stated
+from helpers.contour_posteriors import CELL, assert_near, infer_as_stated
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.parameters.priors import default_priors
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.sweep import scan, scan_many
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 SETTINGS = SamplerSettings(min_ess=300.0, max_r_hat=1.02)
 BRIEF = SamplerSettings(ensembles=2, walkers=32, min_ess=150.0, max_r_hat=1.05)
 TRUTHS = {

@@ -7,41 +7,37 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.contour_posteriors import CELL, only
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.distributions import in_words
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.family import Family
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    ("record", "wrong", "kind", "named"),
     [
-        ({"family": "cube"}, "there is no family 'cube'"),
-        ({"rig": 0.05}, r"rig is 0.05: give Rig\("),
-        ({"rig": None}, r"rig is None: give Rig\("),
-        ({"events": 1}, "events is 1: give True or False"),
+        (RECORD, {"family": "cube"}, ParameterError, ["family", "'cube'"]),
+        (RECORD, {"rig": 0.05}, ParameterError, ["rig is 0.05"]),
+        (RECORD, {"rig": None}, ParameterError, ["rig is None"]),
+        (RECORD, {"events": 1}, ParameterError, ["events is 1"]),
+        (RECORD.holding_moment, {}, RecordError, ["record", "xarray.Dataset"]),
     ],
 )
-def test_arguments_are_checked_when_it_is_made(wrong, message):
-    with pytest.raises(ParameterError, match=message):
-        Experiment(RECORD, **wrong)
-
-
-def test_what_is_no_record_is_refused():
-    with pytest.raises(RecordError, match=r"a record is an xarray\.Dataset"):
-        Experiment(RECORD.holding_moment)
+def test_arguments_are_checked_when_it_is_made(record, wrong, kind, named):
+    with refused(kind, *named):
+        Experiment(record, **wrong)
 
 
 def test_the_model_is_built_once_and_anew_of_another_record():
-    one = Experiment(RECORD, Rig(load_cell=CELL, unknown={**NOTHING, "bias": "default"}), "circle")
+    one = Experiment(RECORD, Rig(load_cell=CELL, unknown=only("bias")), "circle")
     assert one.model is one.model
     other = replace(one, record=RECORD.isel(sample=slice(0, 20)))
     assert other.model is not one.model
@@ -51,7 +47,7 @@ def test_the_model_is_built_once_and_anew_of_another_record():
 
 def test_priors_of_its_own_take_the_place_of_default_ones():
     own = {"q": stats.norm(0.5, 0.1), "friction": stats.halfnorm(scale=0.1)}
-    rig = Rig(load_cell=CELL, unknown={**NOTHING, "friction": own["friction"]})
+    rig = Rig(load_cell=CELL, unknown=only(friction=own["friction"]))
     experiment = Experiment(RECORD, rig, Family("parabola", q=own["q"]))
     assert experiment.model.names == ("a", "q", "x_c", "friction", "noise_scale")
     assert {name: experiment.model.priors[name] for name in own} == own

@@ -10,7 +10,8 @@ import xarray as xr
 from matplotlib import pyplot as plt
 from scipy import stats
 
-from helpers.contour_posteriors import BRIEF, CELL, MODEST, infer_as_stated, measured
+from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, measured, without
+from helpers.refusals import refused
 from helpers.report_pages import analysed_quickly
 from helpers.tasks import through_a_pipe
 from tactile_bayes import plotting
@@ -20,8 +21,7 @@ from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.result import read_result, record_of
-from tactile_bayes.inference.stored_experiment import experiment_of, points_of
+from tactile_bayes.inference.result import read_result
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import to_si
@@ -42,9 +42,6 @@ def tree():
     return infer_as_stated(measured(), family=CENTRED, load_cell=CELL, rng=1, settings=BRIEF)
 
 
-# --- What is said ---------------------------------------------------------------------------------------------------
-
-
 def test_a_number_is_known_and_a_distribution_unknown():
     family = Family("ellipse", a=0.3, q=stats.norm(0.5, 0.1))
     assert family.known == {"a": 0.3}
@@ -55,21 +52,22 @@ def test_a_number_is_known_and_a_distribution_unknown():
 
 
 @pytest.mark.parametrize(
-    ("name", "said", "words"),
+    ("name", "said", "named"),
     [
-        ("cube", {}, "cube"),
-        ("circle", {"a": 0.5}, r"a is no parameter of Family\('circle'\): there are r, q, x_c"),
-        ("circle", {"r": "wide"}, "prior of r"),
-        ("circle", {"r": -0.1}, "r is -0.1"),
-        ("circle", {"r": 0}, "r is 0"),
-        ("circle", {"r": float("nan")}, "r is nan"),
-        ("circle", {"r": stats.norm(0.5, 0.0)}, "give the number, 0.5"),
-        ("circle", {"r": 0.1, "q": 0.5, "x_c": 0.0}, "leaves nothing unknown"),
-        ("shape-free", {"q": 0.5}, "cannot be known"),
+        ("cube", {}, ["cube"]),
+        ("circle", {"a": 0.5}, ["a", "Family('circle')", "r, q, x_c"]),
+        ("circle", {"r": "wide"}, ["prior of r"]),
+        ("circle", {"r": -0.1}, ["r is -0.1"]),
+        ("circle", {"r": 0}, ["r is 0"]),
+        ("circle", {"r": float("nan")}, ["r is nan"]),
+        ("circle", {"r": stats.norm}, ["r", "frozen"]),
+        ("circle", {"r": stats.norm(0.5, 0.0)}, ["the number, 0.5"]),
+        ("circle", {"r": 0.1, "q": 0.5, "x_c": 0.0}, ["nothing unknown"]),
+        ("shape-free", {"q": 0.5}, ["cannot be known"]),
     ],
 )
-def test_what_cannot_be_said_is_refused(name, said, words):
-    with pytest.raises(ParameterError, match=words):
+def test_what_cannot_be_said_is_refused(name, said, named):
+    with refused(ParameterError, *named):
         Family(name, **said)
 
 
@@ -91,29 +89,13 @@ def test_a_family_travels_to_another_process(travel):
     assert travel(family).contours.parameters == family.contours.parameters
 
 
-# --- Its posterior --------------------------------------------------------------------------------------------------
-
-
 def test_known_is_as_a_very_narrow_prior():
-    """Log-densities differ by the prior at its centre, and posteriors by their Monte-Carlo errors.
-
-    Means of 160 effective draws scatter by 0.08 standard deviations, and those by 6 %: limits are four times those of a
-    difference of two.
-    """
+    """Log-densities differ by the prior at its centre."""
     narrow = Family("parabola", x_c=stats.norm(0.0, 1e-7))
     known, wide = (Experiment(measured(), Rig(load_cell=CELL, unknown="nothing"), f).model for f in (CENTRED, narrow))
     point = np.array([[0.49, 0.501, 1.1], [0.52, 0.499, 0.9]])
-    beside = np.insert(point, 2, 0.0, axis=1)
-    expected = wide.log_probability(beside) - stats.norm(0.0, 1e-7).logpdf(0.0)
+    expected = wide.log_probability(np.insert(point, 2, 0.0, axis=1)) - stats.norm(0.0, 1e-7).logpdf(0.0)
     np.testing.assert_allclose(known.log_probability(point), expected, rtol=1e-9)
-    found = [
-        infer_as_stated(measured(), family=family, load_cell=CELL, rng=1, settings=MODEST)["posterior"]
-        for family in (CENTRED, narrow)
-    ]
-    for name in ("a", "q", "noise_scale"):
-        one, other = (each[name] for each in found)
-        assert abs(float(one.mean() - other.mean())) < 0.45 * float(other.std()), name
-        assert float(one.std()) == pytest.approx(float(other.std()), rel=0.35), name
 
 
 def test_known_parameters_are_constant_in_the_posterior(tree):
@@ -129,21 +111,13 @@ def test_known_parameters_are_constant_in_the_posterior(tree):
 
 
 def test_known_parameters_have_the_units_of_the_others():
-    record = to_si(measured(), Rod(0.2, 2.4e-3))
-    family = Family("parabola", a=2.5)
-    tree = infer_as_stated(record, family=family, rng=1, settings=replace(BRIEF, max_steps=2, block_steps=2))
+    record, brief = to_si(measured(), Rod(0.2, 2.4e-3)), replace(BRIEF, max_steps=2, block_steps=2)
+    tree = infer_as_stated(record, family=Family("parabola", a=2.5), rng=1, settings=brief)
     units = {name: draws.attrs["units"] for name, draws in tree["posterior"].data_vars.items()}
     assert units == {"q": "m", "x_c": "m", "noise_scale": "1", "a": "1/m"}
 
 
-def test_a_stored_posterior_has_its_density(tree):
-    model = experiment_of(tree).model
-    points = points_of(tree, model.names)
-    found = model.log_probability(points.reshape(-1, points.shape[-1]))
-    np.testing.assert_allclose(found, tree["sample_stats"]["lp"].values.ravel(), atol=1e-9)
-
-
-def test_bands_and_summaries_of_it_are_numbers(tree):
+def test_bands_and_summaries_of_it_are_numbers_and_figures_are_drawn(tree):
     x = np.linspace(-0.2, 0.2, 5)
     for made in (contour_band(tree, x), contour_band(tree, x, simultaneous=True), normal_band(tree, x)):
         assert all(np.isfinite(made[name]).all() for name in ("median", "lower", "upper"))
@@ -154,34 +128,28 @@ def test_bands_and_summaries_of_it_are_numbers(tree):
     assert implied_contacts(tree, draws=10)["posterior"].sizes["draw"] >= 5
     assert 0.0 <= predictive_check(tree).overall_p_value <= 1.0
     assert not [words for words in check(tree).messages if "x_c" in words]
-
-
-@pytest.mark.parametrize("figure", ["pairs", "trace", "posterior_contours", "prior_contours"])
-def test_figures_of_it_are_drawn(tree, figure):
-    getattr(plotting, figure)(tree)
+    for figure in (plotting.pairs, plotting.trace, plotting.posterior_contours, plotting.prior_contours):
+        figure(tree)
     plt.close("all")
 
 
 @pytest.mark.slow
 def test_the_report_of_it_is_written(tmp_path):
-    record = record_of(infer_as_stated(measured(), family=CENTRED, load_cell=CELL, rng=1, settings=BRIEF))
     rig = Rig(load_cell=CELL, unknown="nothing")
-    analysed_quickly(record, tmp_path, family=CENTRED, rig=rig, settings=BRIEF)
-    page = write_report(tmp_path).read_text(encoding="utf-8")
-    assert "x_c" in page
+    analysed_quickly(without(measured()), tmp_path, family=CENTRED, rig=rig, settings=BRIEF)
+    assert "x_c" in write_report(tmp_path).read_text(encoding="utf-8")
     assert Family.of(read_result(tmp_path / "posterior.nc")) == CENTRED
 
 
 @pytest.mark.slow
 def test_a_stream_takes_known_numbers(tmp_path):
-    stream = Stream(family=CENTRED, rig=Rig(load_cell=CELL, unknown="nothing"), rng=1, particles=200)
+    given = {"family": CENTRED, "rig": Rig(load_cell=CELL, unknown="nothing"), "rng": 1, "particles": 200}
+    stream = Stream(**given)
     for part in np.array_split(np.arange(measured().sizes["sample"]), 2):
         stream.update(measured().isel(sample=part))
     found = stream.posterior()
     assert np.all(found["posterior"].x_c == 0.0)
     assert contour_band(found, [0.0])["median"].values == pytest.approx([0.5], abs=0.005)
     stream.save(tmp_path / "stream.nc")
-    again = Stream.resume(
-        tmp_path / "stream.nc", family=CENTRED, rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, particles=200
-    )
+    again = Stream.resume(tmp_path / "stream.nc", **given)
     xr.testing.assert_equal(again.posterior()["posterior"].to_dataset(), found["posterior"].to_dataset())

@@ -9,55 +9,51 @@ from tactile_bayes.inference.least_squares import optima
 DESIGN = np.random.default_rng(1).normal(size=(50, 2))
 TRUE = np.array([3.0, -0.02])
 SPREAD = np.array([10.0, 0.1])
-MIDDLE = TRUE
+DATA = DESIGN @ (TRUE / SPREAD)
+COVARIANCE = np.linalg.inv(DESIGN.T @ DESIGN + np.eye(2)) * np.outer(SPREAD, SPREAD)
+ORIGIN = np.zeros((1, 2))
 
 
-def best_optimum(*problem, **options):
-    return min(optima(*problem, **options), key=lambda found: found.cost)
+def best_optimum(residuals, candidates, middle=TRUE, spread=SPREAD, *bounds, **options):
+    found = optima(residuals, np.asarray(candidates), middle, spread, *bounds, **options)
+    return min(found, key=lambda each: each.cost)
 
 
-def linear(data):
-    return lambda points: data - points / SPREAD @ DESIGN.T
+def linear(data, scale=1.0):
+    return lambda points: scale * (data - points / SPREAD @ DESIGN.T)
 
 
 def test_optimum_of_a_linear_problem():
-    noise = 0.1 * np.random.default_rng(2).normal(size=50)
-    data = DESIGN @ (TRUE / SPREAD) + noise
-    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    data = DATA + 0.1 * np.random.default_rng(2).normal(size=50)
+    found = best_optimum(linear(data), ORIGIN)
     # Residuals far below _HUBER_THRESHOLD: robust and plain least squares agree to their square over 4 · 2².
     expected = np.linalg.lstsq(DESIGN, data, rcond=None)[0] * SPREAD
     np.testing.assert_allclose(found.point, expected, rtol=0.02)
-    information = DESIGN.T @ DESIGN + np.eye(2)
-    np.testing.assert_allclose(found.covariance, np.linalg.inv(information) * np.outer(SPREAD, SPREAD), rtol=0.02)
+    np.testing.assert_allclose(found.covariance, COVARIANCE, rtol=0.02)
     np.testing.assert_allclose(found.residuals, linear(data)(found.point[None])[0])
 
 
 def test_a_jump_at_the_optimum_is_no_slope():
     """A sample that lets go of the object right there does not say how sure the rest is."""
-    data = DESIGN @ (TRUE / SPREAD)
 
     def jumping(points):
         lost = np.where(points[:, :1] > TRUE[0] + 2e-5 * SPREAD[0], 20.0, 0.0)
-        return np.hstack([linear(data)(points), lost])
+        return np.hstack([linear(DATA)(points), lost])
 
-    found = best_optimum(jumping, np.zeros((1, 2)), MIDDLE, SPREAD)
+    found = best_optimum(jumping, ORIGIN)
     assert abs(found.point[0] - TRUE[0]) < 5e-5 * SPREAD[0]
-    information = DESIGN.T @ DESIGN + np.eye(2)
-    np.testing.assert_allclose(found.covariance, np.linalg.inv(information) * np.outer(SPREAD, SPREAD), rtol=0.02)
+    np.testing.assert_allclose(found.covariance, COVARIANCE, rtol=0.02)
 
 
 def test_an_outlier_pulls_little():
-    data = DESIGN @ (TRUE / SPREAD)
-    data[7] += 1000.0
-    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    found = best_optimum(linear(DATA + 1000.0 * (np.arange(50) == 7)), ORIGIN)
     # By least squares it would pull by 1000 · |design| / 50, some 20 spreads; so by about 2 · |design| / 50.
     assert np.all(np.abs(found.point - TRUE) < 0.2 * SPREAD)
 
 
 def test_a_tight_prior_is_heeded():
     """Data say 3.0 with a deviation of about 10/√50; a prior that is a million times tighter wins."""
-    spread = np.array([1e-6, 0.1])
-    found = best_optimum(lambda p: linear(DESIGN @ (TRUE / SPREAD))(p), MIDDLE[None], np.array([2.0, -0.02]), spread)
+    found = best_optimum(linear(DATA), TRUE[None], np.array([2.0, -0.02]), np.array([1e-6, 0.1]))
     assert found.point[0] == pytest.approx(2.0, abs=1e-5)
     assert found.covariance[0, 0] == pytest.approx(1e-12, rel=0.5)
 
@@ -67,13 +63,12 @@ def test_the_better_of_two_valleys_is_taken():
         return np.where(points > 0.0, points - 1.0, 0.25 * (points + 1.0) ** 2 + 2.0) + np.zeros((1, 3))
 
     for order in ([[-1.5], [0.7]], [[0.7], [-1.5]]):
-        assert best_optimum(residuals, np.array(order), np.ones(1), np.ones(1)).point == pytest.approx(1.0)
+        assert best_optimum(residuals, order, np.ones(1), np.ones(1)).point == pytest.approx(1.0)
 
 
 def test_a_search_from_far_off_is_as_good_as_one_from_near():
     """Residuals of thousands pull by their squares at first, else forty steps would not lead here."""
-    data = 1e4 * DESIGN @ (TRUE / SPREAD)
-    found = best_optimum(lambda p: data - 1e4 * p / SPREAD @ DESIGN.T, [100.0 * SPREAD], MIDDLE, SPREAD)
+    found = best_optimum(linear(DATA, scale=1e4), [100.0 * SPREAD])
     np.testing.assert_allclose(found.point, TRUE, rtol=1e-6)
     assert found.fits
 
@@ -87,10 +82,9 @@ def test_to_be_far_from_the_prior_costs_its_square():
 
 def test_a_search_that_ends_beyond_what_is_possible_goes_on_inside():
     """Of two parameters that are told apart by the data the one at its end stays there, the other moves freely."""
-    data = DESIGN @ (TRUE / SPREAD)
-    free = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    free = best_optimum(linear(DATA), ORIGIN)
     low, high = free.point - np.array([10.0, 0.5]) * SPREAD, free.point + np.array([10.0, -0.1]) * SPREAD
-    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD, low, high)
+    found = best_optimum(linear(DATA), ORIGIN, TRUE, SPREAD, low, high)
     np.testing.assert_allclose(found.beyond, free.point)
     assert found.point[1] == pytest.approx(high[1], abs=1e-3 * SPREAD[1])
     assert np.all((found.point > low) & (found.point < high))
@@ -103,13 +97,12 @@ PASSED = Deadline.after(0.0)
 
 def test_past_the_deadline_one_candidate_has_to_do():
     """With the covariance that belongs to it, and no word of what lies beyond what is possible."""
-    data = DESIGN @ (TRUE / SPREAD)
-    first, second = TRUE + 5.0 * SPREAD, TRUE
-    found = best_optimum(linear(data), np.array([first, second]), MIDDLE, SPREAD, deadline=PASSED)
+    first = TRUE + 5.0 * SPREAD
+    found = best_optimum(linear(DATA), [first, TRUE], deadline=PASSED)
     np.testing.assert_allclose(found.point, first, rtol=1e-14)
-    np.testing.assert_allclose(found.residuals, linear(data)(first[None])[0])
+    np.testing.assert_allclose(found.residuals, linear(DATA)(first[None])[0])
     assert np.all(np.linalg.eigvalsh(found.covariance) > 0.0)
     low = first + SPREAD
-    inside = best_optimum(linear(data), np.array([first]), MIDDLE, SPREAD, low, deadline=PASSED)
+    inside = best_optimum(linear(DATA), [first], TRUE, SPREAD, low, deadline=PASSED)
     assert inside.beyond is None
     assert np.all(inside.point > low)

@@ -25,13 +25,9 @@ from tactile_bayes.inference.result import (
 SETTINGS = SamplerSettings(ensembles=2, walkers=4, block_steps=8, max_steps=8)
 
 
-def draws():
-    start = np.random.default_rng(1).normal(size=(2, 4, 1))
-    return sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=1, settings=SETTINGS)
-
-
 def test_sample_stats_and_provenance_are_those_of_the_draws():
-    some = draws()
+    start = np.random.default_rng(1).normal(size=(2, 4, 1))
+    some = sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=1, settings=SETTINGS)
     group = sample_stats(some)
     np.testing.assert_array_equal(group.lp.values, some.log_probability)
     np.testing.assert_array_equal(group.r_hat.sel(parameter="x"), some.r_hat[0])
@@ -75,26 +71,28 @@ def test_draws_of_a_tree_and_of_a_dataset():
         posterior_draws(xr.DataTree())
 
 
-def test_arviz_takes_a_result():
+def assert_summarised(summary):
     """ArviZ's summary has our means, and its effective sample sizes are those that we stopped by."""
-    result = posterior()
-    handed = to_arviz(result)
+    draws, stats = (posterior()[group].to_dataset() for group in ("posterior", "sample_stats"))
+    names = list(draws.data_vars)
+    assert list(summary.index) == names
+    means = [float(draws[name].mean()) for name in names]
+    np.testing.assert_allclose(summary["mean"].astype(float), means, rtol=1e-6)
+    np.testing.assert_allclose(summary["ess_bulk"].astype(float), stats.ess_bulk.sel(parameter=names), rtol=0.01)
+
+
+def test_arviz_takes_a_result():
+    handed = to_arviz(posterior())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 announces its refactoring
         import arviz
 
-        summary = arviz.summary(handed, round_to="none")
-    names = list(result["posterior"].data_vars)
-    assert list(summary.index) == names
-    means = [float(result["posterior"][name].mean()) for name in names]
-    np.testing.assert_allclose(summary["mean"].astype(float), means, rtol=1e-6)
-    stats = result["sample_stats"].to_dataset()
-    np.testing.assert_allclose(summary["ess_bulk"].astype(float), stats.ess_bulk.sel(parameter=names), rtol=0.01)
+        assert_summarised(arviz.summary(handed, round_to="none"))
     if arviz.__version__.startswith("0."):
         assert isinstance(handed, arviz.InferenceData)
         assert {"posterior", "log_likelihood", "posterior_predictive", "observed_data"} <= set(handed.groups())
     else:
-        assert handed is result
+        assert handed is posterior()
 
 
 def test_arviz_from_one_on_takes_a_result_as_it_is(monkeypatch):
@@ -111,12 +109,6 @@ def test_arviz_from_one_on_takes_a_result_as_it_is(monkeypatch):
 
 
 def test_what_arviz_is_made_of_from_one_on_reads_the_file(tmp_path):
-    result = posterior()
-    write_result(result, tmp_path / "posterior.nc")
+    write_result(posterior(), tmp_path / "posterior.nc")
     with xr.open_datatree(tmp_path / "posterior.nc", engine="h5netcdf") as tree:
-        summary = arviz_stats.summary(tree, round_to="none")
-    names, stats = list(result["posterior"].data_vars), result["sample_stats"].to_dataset()
-    assert list(summary.index) == names
-    means = [float(result["posterior"][name].mean()) for name in names]
-    np.testing.assert_allclose(summary["mean"].astype(float), means, rtol=1e-6)
-    np.testing.assert_allclose(summary["ess_bulk"].astype(float), stats.ess_bulk.sel(parameter=names), rtol=0.01)
+        assert_summarised(arviz_stats.summary(tree, round_to="none"))

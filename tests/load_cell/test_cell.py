@@ -12,23 +12,8 @@ from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, frame_of, in_frame, present_channels, to_dimensionless, to_si
+from tactile_bayes.record import CHANNELS, frame_of, in_frame, present_channels, to_si
 from tactile_bayes.rig import Rig
-
-# --- The cell itself --------------------------------------------------------------------------------------------
-
-
-def test_every_channel_has_its_standard_deviation():
-    assert CELL.standard_deviations == {"holding_moment": 0.02, "force_x": 0.05, "force_y": 0.05}
-    assert tuple(CELL.standard_deviations) == CHANNELS
-
-
-def test_the_data_sheet_is_converted_with_the_record():
-    rod = Rod(0.2, 2.4e-3)
-    measured = CELL.measure(ideal(rod=rod), rng=1)
-    assert LoadCell.from_record(to_dimensionless(measured)) == CELL.dimensionless(rod)
-    assert CELL.dimensionless(Rod()) == CELL
-
 
 # --- Measuring --------------------------------------------------------------------------------------------------
 
@@ -55,6 +40,7 @@ def test_truth_is_kept_and_the_argument_is_not_changed():
         assert measured[name].attrs == record[name].attrs
     for name in set(record) - set(CHANNELS):
         assert measured[name].identical(record[name])
+    assert "truth_drive_angle" not in measured  # the encoder is ideal
     measured["truth_force_x"][:] = 7
     assert record.identical(before)
 
@@ -69,28 +55,11 @@ def test_measuring_twice_keeps_the_first_truth_and_adds_variances():
     np.testing.assert_array_equal(twice["holding_moment"], once["holding_moment"])
 
 
-def test_a_cell_that_turns_has_its_noise_on_what_it_measures():
-    """The same numbers on axial and transversal force as on horizontal and vertical; turning leaves their law alone."""
-    record = ideal()
-    fixed, turning = CELL.measure(record, rng=1), CELL.measure(in_frame(record, "turning"), rng=1)
-    assert frame_of(turning) == "turning"
-    for name in CHANNELS:
-        noise = fixed[name] - record[name]
-        np.testing.assert_allclose(turning[name] - in_frame(record, "turning")[name], noise, rtol=0, atol=1e-15)
-        np.testing.assert_array_equal(turning[f"truth_{name}"], in_frame(record, "turning")[name])
-    assert turning["truth_force_x"].attrs["long_name"] == "true axial support reaction"
-    back = in_frame(turning, "fixed")
-    np.testing.assert_allclose(back["truth_force_y"], record["force_y"], rtol=0, atol=1e-15)
-    size = np.hypot(turning["force_x"] - turning["truth_force_x"], turning["force_y"] - turning["truth_force_y"])
-    turned_size = np.hypot(back["force_x"] - back["truth_force_x"], back["force_y"] - back["truth_force_y"])
-    np.testing.assert_allclose(turned_size, size, rtol=1e-13)
-
-
 def test_a_missing_channel_stays_missing_and_the_others_have_the_same_noise():
-    measured = CELL.measure(ideal(missing=("force_x",)), rng=1)
+    every = cell(drift=WALK, bias_uncertainty=UNKNOWN, correlation=SHARED, relative_noise=0.1, force_resolution=0.01)
+    measured, whole = (every.measure(ideal(missing=missing), rng=1) for missing in (("force_x",), ()))
     assert present_channels(measured) == ("holding_moment", "force_y")
     assert "truth_force_x" not in measured
-    whole = CELL.measure(ideal(), rng=1)
     for name in ("holding_moment", "force_y"):
         assert measured[name].identical(whole[name])
 
@@ -102,9 +71,10 @@ def test_measuring_twice_is_refused_where_it_makes_no_load_cell(further):
             second.measure(first.measure(ideal(), rng=1), rng=2)
 
 
-def test_an_ideal_cell_measures_what_was_measured():
+def test_an_ideal_cell_measures_what_was_measured_and_takes_nothing_out():
     once = cell(bias=(0.1, 0.0, 0.0), drift=WALK).measure(ideal(), rng=1)
     assert LoadCell().measure(once, rng=2).identical(once)
+    assert cell(drift=WALK).corrected(once) is once
 
 
 @pytest.mark.parametrize("name", NORMAL)
@@ -118,28 +88,36 @@ def test_a_record_is_measured_as_arrays_are(name):
 
 def test_cross_talk_from_a_channel_that_is_missing_is_refused():
     partial = ideal(missing=("force_x",))
-    with refused(ParameterError, "cross-talk", "holding_moment"):
-        cell(gain=GAIN).measure(partial, rng=1)
     alone = cell(gain=np.diag([1.1, 1.2, 1.3])).measure(partial, rng=1)
     assert present_channels(alone) == ("holding_moment", "force_y")
+    assert cell(lever=(0.1, 0.0)).corrected(partial).holding_moment[-1] == partial.holding_moment[-1] + 0.1 * 2.0
+    with refused(ParameterError, "cross-talk", "holding_moment"):
+        cell(gain=GAIN).measure(partial, rng=1)
     for sheet in (cell(gain=GAIN), cell(lever=(0.0, 0.1))):
         with refused(ParameterError, "cross-talk", "gain"):
             sheet.corrected(partial)
-    assert cell(lever=(0.1, 0.0)).corrected(partial).holding_moment[-1] == partial.holding_moment[-1] + 0.1 * 2.0
 
 
 # --- The frame --------------------------------------------------------------------------------------------------
 
 
-def test_a_cell_that_turns_turns_the_record():
-    sheet = cell(frame="turning", bias=(0.1, -0.2, 0.3), force_range=1.0, correlation=SHARED)
-    measured = sheet.measure(ideal(), rng=1)
-    turning = cell(bias=(0.1, -0.2, 0.3), force_range=1.0, correlation=SHARED)
-    assert measured.identical(turning.measure(in_frame(ideal(), "turning"), rng=1))
-    assert frame_of(measured) == "turning"
-    assert frame_of(cell(frame="fixed").measure(in_frame(ideal(), "turning"), rng=1)) == "fixed"
+def test_a_cell_that_turns_has_its_noise_on_what_it_measures():
+    """The same numbers on axial and transversal force as on horizontal and vertical, in whatever frame a record is."""
+    record, turned = ideal(), in_frame(ideal(), "turning")
+    fixed, turning = CELL.measure(record, rng=1), CELL.measure(turned, rng=1)
+    assert frame_of(turning) == "turning"
+    for name in CHANNELS:
+        np.testing.assert_allclose(turning[name] - turned[name], fixed[name] - record[name], rtol=0, atol=1e-15)
+        np.testing.assert_array_equal(turning[f"truth_{name}"], turned[name])
+    assert turning["truth_force_x"].attrs["long_name"] == "true axial support reaction"
+    flaws = {"bias": (0.1, -0.2, 0.3), "force_range": 1.0, "correlation": SHARED}
+    of_turning = cell(frame="turning", **flaws)
+    measured = of_turning.measure(record, rng=1)
+    assert measured.identical(cell(**flaws).measure(turned, rng=1))
+    assert frame_of(cell(frame="fixed").measure(turned, rng=1)) == "fixed"
+    np.testing.assert_allclose(in_frame(turning, "fixed")["truth_force_y"], record["force_y"], rtol=0, atol=1e-15)
     with refused(RecordError, "force_x"):
-        sheet.measure(ideal(missing=("force_x",)), rng=1)
+        of_turning.measure(ideal(missing=("force_x",)), rng=1)
     with refused(ParameterError, "fixed", "turning"):
         cell(frame="fixed", bias=(0.1, 0.0, 0.0)).corrected(measured)
 
@@ -165,10 +143,9 @@ def test_readings_of_the_encoder_go_back_but_the_rod_does_not():
     # Noise and rounding: a normal number and a uniform one; the test fails for one seed in a million.
     steps = np.linspace(-0.5, 0.5, 201)[:, None] * 0.0015
     assert stats.kstest(off, lambda x: stats.norm.cdf((x - steps) / 0.005).mean(axis=0)).pvalue > 1e-6
-
-
-def test_an_ideal_encoder_keeps_no_truth():
-    assert "truth_drive_angle" not in CELL.measure(ideal(), rng=1)
+    assert abs(np.corrcoef(off[1:], off[:-1])[0, 1]) < 5.0 / np.sqrt(off.size)
+    whole = measured.drive_angle / 0.0015
+    np.testing.assert_allclose(whole, np.round(whole), rtol=0, atol=1e-9)
 
 
 def test_an_encoder_that_shows_no_sweep_is_refused():
@@ -230,8 +207,3 @@ def test_taking_out_leaves_noise_and_what_is_unknown():
     loads[:, 0] += 0.2 * loads[:, 1] - 0.1 * loads[:, 2]
     np.testing.assert_allclose(loads @ np.array(GAIN).T + [0.1, -0.2, 0.3], readings, rtol=0, atol=1e-14)
     np.testing.assert_allclose(back.drive_angle, ideal(20).drive_angle, rtol=1e-15)
-
-
-def test_nothing_to_take_out_changes_nothing():
-    measured = cell(drift=WALK, bias_uncertainty=UNKNOWN).measure(ideal(), rng=1)
-    assert cell(drift=WALK).corrected(measured) is measured

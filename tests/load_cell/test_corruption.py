@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from helpers.load_cells import CELL, GAIN, NORMAL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
+from helpers.load_cells import CELL, GAIN, NORMAL, SHARED, UNKNOWN, WALK, cell, moments
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
@@ -65,33 +65,12 @@ def test_outliers_beside_drift_and_bias_have_the_sum_of_variances():
 
 
 def test_the_stated_standard_deviations_are_those_of_the_readings():
-    for sheet in (CELL, cell(degrees_of_freedom=12.0)):
-        made = replicates(sheet, 34, np.zeros((5, 3))).reshape(-1, 3)
-        # The fourth moment of t with 12 degrees of freedom is 3.75 squares of the second.
-        error = np.sqrt(2.75 / 4 / len(made))
-        ratio = made.std(axis=0) / list(sheet.standard_deviations.values())
-        assert np.abs(ratio - 1.0).max() < 5.0 * error
-    assert set(cell(degrees_of_freedom=2.0).standard_deviations.values()) == {np.inf}
-
-
-def test_a_bias_that_is_not_known_is_one_for_each_record():
-    sheet = LoadCell(bias=(0.0, 1.0, 0.0), bias_uncertainty=UNKNOWN)
-    made = replicates(sheet, 35, np.zeros((4, 3)), count=5000)
-    assert (made == made[:, :1]).all()
-    assert stats.kstest(((made[:, 0] - [0.0, 1.0, 0.0]) / UNKNOWN).ravel(), "norm").pvalue > 1e-6
-
-
-def test_drift_starts_from_nothing_or_stationary():
-    walk = replicates(LoadCell(drift=WALK), 36, np.zeros((40, 3)), count=4000)
-    assert (walk[:, 0] == 0.0).all()
-    steps = np.diff(walk, axis=1) / [0.015, 0.03, 0.03]
-    assert stats.kstest(steps.ravel(), "norm").pvalue > 1e-6
-    wander = replicates(LoadCell(drift=WANDER), 37, np.zeros((40, 3)), count=4000) / [0.03, 0.02, 0.02]
-    for sample in (0, 1, 39):
-        assert stats.kstest(wander[:, sample].ravel(), "norm").pvalue > 1e-6
-    # The mean product of two samples k apart is exp(−k/time); of 12 000 it has an error less than √2/√12000.
-    for k in (1, 3, 10):
-        assert abs((wander[:, 5] * wander[:, 5 + k]).mean() - np.exp(-k / 2.5)) < 5.0 * np.sqrt(2.0 / 12_000)
+    """Which are normal or of Student's t, by the tests above."""
+    noise = {"holding_moment": 0.02, "force_x": 0.05, "force_y": 0.05}
+    assert list(CELL.standard_deviations.items()) == list(noise.items())
+    for nu, factor in ((12.0, np.sqrt(12.0 / 10.0)), (2.0, np.inf)):
+        found = cell(degrees_of_freedom=nu).standard_deviations
+        assert found == pytest.approx({name: factor * value for name, value in noise.items()})
 
 
 def test_no_samples_are_none():
@@ -118,11 +97,8 @@ def test_readings_are_steps_within_the_range(further):
     np.testing.assert_allclose(whole, np.round(whole), rtol=0, atol=1e-12)
     # Cut off and rounded is what would have been read without.
     free = replicates(cell(**further), 39)
-    np.testing.assert_array_equal(made, np.round(np.clip(free, *limits(sheet)) / sheet.resolution) * sheet.resolution)
-
-
-def limits(sheet):
-    return -sheet.limit, sheet.limit
+    cut = np.clip(free, -sheet.limit, sheet.limit)
+    np.testing.assert_array_equal(made, np.round(cut / sheet.resolution) * sheet.resolution)
 
 
 def test_steps_are_white_noise_of_a_twelfth_of_their_square():
@@ -143,19 +119,6 @@ def test_steps_are_white_noise_of_a_twelfth_of_their_square():
 # --- The encoder ------------------------------------------------------------------------------------------------
 
 
-def test_the_encoder_has_its_offset_noise_and_steps():
-    angles = np.linspace(1.0, 1.2, 20_000)
-    noisy = LoadCell(drive_angle_offset=0.3, drive_angle_noise=0.01)
-    made = corrupted_angles(noisy, angles, "forward", np.random.default_rng(42))
-    assert stats.kstest((made - angles - 0.3) / 0.01, "norm").pvalue > 1e-6
-    between = np.corrcoef((made - angles)[1:], (made - angles)[:-1])[0, 1]
-    assert abs(between) < 5.0 / np.sqrt(20_000)
-    stepped = LoadCell(drive_angle_offset=0.3, drive_angle_resolution=0.01)
-    made = corrupted_angles(stepped, angles, "forward", np.random.default_rng(43))
-    np.testing.assert_allclose(made, np.round((angles + 0.3) / 0.01) * 0.01, rtol=1e-15)
-    assert np.abs(made - angles - 0.3).max() <= 0.005 + 1e-15
-
-
 def test_an_encoder_with_backlash_reads_more_forward_than_backward():
     angles = np.linspace(1.0, 1.2, 5)
     slack = LoadCell(drive_angle_offset=0.3, drive_angle_backlash=0.01)
@@ -174,6 +137,7 @@ def test_a_factor_is_on_white_noise_only(name):
     one, two = (sheet.simulate(loads, rng=44, noise_scale=f) for f in ((1.0, 1.0, 1.0), [[1.0, 2.0, 3.0]] * 3))
     none = sheet.simulate(loads, rng=44, noise_scale=1e-300)
     np.testing.assert_allclose(two - none, (one - none) * [1.0, 2.0, 3.0], rtol=0, atol=1e-14)
+    assert sheet.simulate(LOADS, rng=1, noise_scale=np.ones((4, 3))).shape == (4, N, 3)
 
 
 def test_white_noise_is_the_same_whatever_else_there_is():
@@ -184,23 +148,15 @@ def test_white_noise_is_the_same_whatever_else_there_is():
     np.testing.assert_allclose(both[0] - both[1], plain, rtol=0, atol=1e-15)
 
 
-def test_channels_that_are_missing_stay_missing():
-    loads = LOADS.copy()
-    loads[:, 1] = np.nan
-    every = cell(drift=WALK, bias_uncertainty=UNKNOWN, correlation=SHARED, relative_noise=0.1, force_resolution=0.01)
-    made = every.simulate(loads, rng=46)
-    assert np.isnan(made).tolist() == [[False, True, False]] * N
-    np.testing.assert_array_equal(made[:, [0, 2]], every.simulate(LOADS, rng=46)[:, [0, 2]])
-
-
-def test_loads_and_factors_that_do_not_fit_are_refused():
-    for shape in ((3,), (4, 2), ()):
-        with refused(ParameterError, "shape", shape):
-            CELL.simulate(np.zeros(shape), rng=1)
-    with refused(ParameterError, "noise_scale", -1.0):
-        CELL.simulate(LOADS, rng=1, noise_scale=-1.0)
-    assert CELL.simulate(LOADS, rng=1, noise_scale=np.ones((4, 3))).shape == (4, N, 3)
-    with refused(ParameterError, "noise_scale", "(4, 2)", "(3,)"):
-        CELL.simulate(LOADS, rng=1, noise_scale=np.ones((4, 2)))
-    with refused(ParameterError, "rng", "'1'"):
-        CELL.simulate(LOADS, rng="1")
+@pytest.mark.parametrize(
+    ("loads", "options", "named"),
+    [
+        *((np.zeros(shape), {}, ["shape", shape]) for shape in ((3,), (4, 2), ())),
+        (LOADS, {"noise_scale": -1.0}, ["noise_scale", -1.0]),
+        (LOADS, {"noise_scale": np.ones((4, 2))}, ["noise_scale", "(4, 2)", "(3,)"]),
+        (LOADS, {"rng": "1"}, ["rng", "'1'"]),
+    ],
+)
+def test_loads_and_factors_that_do_not_fit_are_refused(loads, options, named):
+    with refused(ParameterError, *named):
+        CELL.simulate(loads, **{"rng": 1} | options)

@@ -6,8 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from helpers.load_cells import cell, ideal
-from helpers.refusals import refused
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.curve import curved, straightened, unsaturated
 
@@ -68,9 +66,3 @@ def test_slopes_are_those_of_readings():
         step = 1e-6 * np.eye(3)[channel]
         change = (sheet.expected(loads + step) - sheet.expected(loads - step)) / 2e-6
         np.testing.assert_allclose(sheet.slopes(loads)[..., channel], change, atol=1e-7)
-
-
-def test_it_is_refused_if_it_is_no_curve():
-    for wrong in ((1.0,), (np.nan, 0.0), "bent"):
-        with refused(ParameterError, "moment_curve"):
-            LoadCell(moment_curve=wrong)

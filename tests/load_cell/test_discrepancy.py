@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from helpers.load_cells import CELL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
+from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import kalman
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
@@ -91,10 +92,9 @@ def test_a_batch_is_its_members_and_missing_channels_do_not_count():
     discrepancy, _, _, measured, loads, scale = drawn(5, batch=(3,))
     measured[:, 1] = np.nan
     together = CELL.log_likelihood(measured, loads, noise_scale=scale, discrepancy=discrepancy)
-    alone = [
-        CELL.log_likelihood(measured, loads[i], noise_scale=scale[i], discrepancy=discrepancy.take(i)) for i in range(3)
-    ]
-    np.testing.assert_allclose(together, alone, rtol=1e-13)
+    for i, alone in enumerate(together):
+        of_one = CELL.log_likelihood(measured, loads[i], noise_scale=scale[i], discrepancy=discrepancy.take(i))
+        assert of_one == pytest.approx(alone, rel=1e-13)
     moved = replace(discrepancy, deviation=discrepancy.deviation * [1.0, 7.0, 1.0])
     np.testing.assert_array_equal(together, CELL.log_likelihood(measured, loads, noise_scale=scale, discrepancy=moved))
 
@@ -105,12 +105,9 @@ def test_without_size_it_is_the_likelihood_without_it(name):
     nothing = replace(discrepancy, deviation=0.0 * discrepancy.deviation)
     sheet = replace(BESIDE[name], force_resolution=0.0, moment_resolution=0.0)
     for density in (sheet.log_likelihood, sheet.log_density_left_out):
-        np.testing.assert_allclose(
-            density(measured, loads, noise_scale=scale, discrepancy=nothing),
-            density(measured, loads, noise_scale=scale),
-            rtol=1e-12,
-            atol=1e-11,
-        )
+        expected = density(measured, loads, noise_scale=scale)
+        found = density(measured, loads, noise_scale=scale, discrepancy=nothing)
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
 
 
 @given(st.floats(1e-6, 1e3), st.floats(1e-4, 1e12), st.floats(1e-6, 1e2))
@@ -190,23 +187,18 @@ def test_readings_are_drawn_with_it_and_without_it_as_before():
 
 
 @pytest.mark.parametrize(
-    ("sheet", "reason"),
+    ("sheet", "repeated", "reason"),
     [
-        (cell(correlation=SHARED), "correlated between channels exclude"),
-        (cell(degrees_of_freedom=4.0), "a discrepancy with outliers"),
-        (cell(force_range=0.2), "at the end of the load cell's range, and with a discrepancy"),
+        (cell(correlation=SHARED), False, "correlated between channels"),
+        (cell(degrees_of_freedom=4.0), False, "outliers"),
+        (cell(force_range=0.2), False, "range"),
+        (cell(drift=WALK), True, "repeated sweeps"),
     ],
 )
-def test_what_has_no_closed_form_is_refused(sheet, reason):
-    discrepancy, _, _, measured, loads, _ = drawn(9)
-    with pytest.raises(ParameterError, match=reason):
+def test_what_has_no_closed_form_is_refused(sheet, repeated, reason):
+    discrepancy, _, _, measured, loads, _ = drawn(9, repeated=repeated)
+    with refused(ParameterError, "discrepancy", reason):
         sheet.log_likelihood(np.clip(measured, -0.2, 0.2), loads, discrepancy=discrepancy)
-
-
-def test_a_drift_in_another_order_is_refused():
-    discrepancy, _, _, measured, loads, _ = drawn(10, repeated=True)
-    with pytest.raises(ParameterError, match="repeated sweeps"):
-        cell(drift=WALK).log_likelihood(measured, loads, discrepancy=discrepancy)
 
 
 def test_it_is_compiled_once_whatever_arrays_come():

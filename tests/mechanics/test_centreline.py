@@ -5,12 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from helpers.refusals import refused
-from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.sweep import scan
 
 POINTS = 41
 ARCLENGTHS = np.linspace(0.0, 1.0, POINTS)
@@ -56,20 +54,6 @@ def test_rod_is_what_integration_gives(contact, phase, side):
     np.testing.assert_allclose(
         rod_shape(*wrench, points=POINTS), integrated(*wrench, float(w.contact_arclength)), atol=1e-9, rtol=0
     )
-
-
-@pytest.mark.parametrize("name", ["I", "II", "III", "IV"])
-def test_rods_of_sweeps_are_what_integration_gives(name):
-    record = scan(paper_profile(name, q=0.3), drive_step=np.radians(7.0)).record
-    record = record.isel(sample=np.flatnonzero(record["truth_contact_phase"].values != "none"))
-    names = ("drive_angle", "holding_moment", "force_x", "force_y", "truth_contact_arclength")
-    columns = [record[column].values for column in names]
-    assert (columns[1] > 0).any()
-    assert (columns[1] < 0).any()
-    x, y = rod_shape(*columns[:4], points=POINTS)
-    expected = np.array([integrated(*state) for state in zip(*columns, strict=True)])
-    np.testing.assert_allclose(x, expected[:, 0], atol=1e-9, rtol=0)
-    np.testing.assert_allclose(y, expected[:, 1], atol=1e-9, rtol=0)
 
 
 def test_tip_contact_ends_at_the_contact():

@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
-from helpers.legendre import equilibrium, tangential_arclength
+from helpers.legendre import equilibrium
 from helpers.single_states import states_at
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.branches.crossings import DIP
 from tactile_bayes.mechanics.paths import trace
-from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.phases import NONE, TIP
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability, SnapOff
 from tactile_bayes.record import CHANNELS
 
@@ -18,17 +17,11 @@ SCAN = {}
 LIKELIHOOD = {"tolerance": np.array([4e-5, 1e-4, 1e-4])}
 
 
-def sweep_frame_of(contour, base_x=0.0, base_y=0.0, mirrored=False, standoff=0.0):
-    n = contour.shape[0] if contour.shape else 1
-    index = (n,)
-    return SweepFrame(
-        contour.broadcast_to(index),
-        np.full(n, base_x) if np.ndim(base_x) == 0 else base_x,
-        np.full(n, base_y) if np.ndim(base_y) == 0 else base_y,
-        1.0,
-        standoff,
-        np.broadcast_to(np.asarray(mirrored), index),
-    )
+def sweep_frame_of(contour, mirrored=False, standoff=0.0):
+    """Contours, the pivot at the origin and the rod one long."""
+    index = contour.shape or (1,)
+    zero = np.zeros(index)
+    return SweepFrame(contour.broadcast_to(index), zero, zero, 1.0, standoff, np.broadcast_to(mirrored, index))
 
 
 def wide(family, n, seed):
@@ -50,20 +43,6 @@ def wide(family, n, seed):
 
 
 FAMILIES = ("parabola", "circle", "power", "joined")
-
-
-def paths_of(sweep_frame, i, friction_angle=0.0, **options):
-    """The path of one lane, alone."""
-    pick = np.array([i])
-    alone = SweepFrame(
-        sweep_frame.contour.take(pick),
-        sweep_frame.base_x[pick],
-        sweep_frame.base_y[pick],
-        sweep_frame.length,
-        sweep_frame.standoff,
-        sweep_frame.mirrored[pick],
-    )
-    return trace(alone, friction_angle=friction_angle, **options)
 
 
 # --- a search for trouble ---------------------------------------------------------------------------------------------
@@ -243,20 +222,10 @@ def test_nearer_than_the_clearance_there_is_no_path():
 
 
 def test_reach():
-    paths = trace(
-        sweep_frame_of(
-            Circle(
-                np.array([1.0, 1.0, 0.2, 1.0, 1.0]), np.array([0.5, 1.1, 0.3, -0.1, -1.5]), np.array([0, 0, -0.6, 0, 0])
-            )
-        )
-    )
-    assert [Reachability(int(r)).name for r in paths.reach] == [
-        "TOUCHES",
-        "TOO_FAR",
-        "ENDS",
-        "CUTS_PIVOT",
-        "CUTS_PIVOT",
-    ]
+    circles = Circle([1.0, 1.0, 0.2, 1.0, 1.0], [0.5, 1.1, 0.3, -0.1, -1.5], [0, 0, -0.6, 0, 0])
+    paths = trace(sweep_frame_of(circles))
+    names = [Reachability(int(reach)).name for reach in paths.reach]
+    assert names == ["TOUCHES", "TOO_FAR", "ENDS", "CUTS_PIVOT", "CUTS_PIVOT"]
     np.testing.assert_allclose(paths.distance[:2], [0.5, 1.1], rtol=1e-14)
 
 
@@ -283,14 +252,7 @@ def interpolation_errors(family, options, count=150, samples=20):
     truth = np.empty_like(told)
     for block in np.array_split(np.arange(index.size), max(1, index.size // 25)):
         some = index[block]
-        few = SweepFrame(
-            sweep_frame.contour.take(some),
-            sweep_frame.base_x[some],
-            sweep_frame.base_y[some],
-            1.0,
-            0.0,
-            sweep_frame.mirrored[some],
-        )
+        few = sweep_frame_of(sweep_frame.contour.take(some), sweep_frame.mirrored[some])
         i = np.repeat(np.arange(some.size), samples)
         wrench = trace(few, **SCAN).states(i, angle[some].ravel()).wrench
         truth[block] = np.stack([getattr(wrench, name) for name in CHANNELS], -1).reshape(some.size, samples, 3)
@@ -314,27 +276,6 @@ def test_what_the_likelihood_interpolates(family):
     assert fine[distance > 0.1].max() < 1e-4
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("family", FAMILIES)
-def test_many_contours_at_once_equal_one_at_a_time(family):
-    contour, mirrored = wide(family, 40, 30)
-    sweep_frame = sweep_frame_of(contour, mirrored=mirrored)
-    angle = np.linspace(0.0, 3.5, 40)
-    for options in (SCAN, LIKELIHOOD):
-        many = trace(sweep_frame, **options)
-        table = many.observables(angle)
-        for i in range(0, 40, 4):
-            one = paths_of(sweep_frame, i, **options)
-            assert one.reach[0] == many.reach[i]
-            assert one.snap_off[0] == many.snap_off[i]
-            for name in ("first_angle", "snap_angle", "distance"):
-                np.testing.assert_allclose(getattr(one, name)[0], getattr(many, name)[i], rtol=0, atol=1e-12)
-            scale = 1 + np.abs(table[i]).max()
-            # Newton's steps settle together; what they leave is far below the interpolation's error.
-            off = np.abs(one.observables(angle)[0] - table[i]) / scale
-            assert np.all(off < 1e-6)
-
-
 def test_first_contact_with_an_edge_straight_above_the_pivot():
     """From first contact on, no point of the arc within reach lies lower: the rod would have met it before."""
     rng, count = np.random.default_rng(4), 1500
@@ -343,8 +284,7 @@ def test_first_contact_with_an_edge_straight_above_the_pivot():
     sizes = np.exp(rng.uniform(np.log(0.05), np.log(10.0), (2, count)))
     vertices = -np.tan([before, after]) / (2.0 * sizes)
     halves = [Parabola(a, y - a * x_c**2, x_c) for a, x_c in zip(sizes, vertices, strict=True)]
-    index, zero = np.arange(count), np.zeros(count)
-    sweep_frame = SweepFrame(Joined(*halves, x=zero), zero, zero, 1.0, 0.0, np.zeros(count, dtype=bool))
+    index, sweep_frame = np.arange(count), sweep_frame_of(Joined(*halves, x=np.zeros(count)))
     paths = trace(sweep_frame, tolerance=np.full(3, 1e-3))
     first = paths.first_parameter
     end = sweep_frame.domain()[1]
@@ -360,11 +300,7 @@ def test_first_contact_is_not_sought_where_directions_are_rounding():
     """The halves end 1e15 rod lengths away, at a slope of almost π/2; the right one alone is open."""
     left = Parabola(2.978468290506286, -0.054262206189445134, 0.1995164199561281)
     right = Parabola(2.978468290506286, -0.06176136045269866, -0.20572941132934008)
-    zero, forward = np.zeros(1), np.zeros(1, dtype=bool)
-    joined, alone = (
-        trace(SweepFrame(contour.broadcast_to((1,)), zero, zero, 1.0, 0.0, forward)).first_angle
-        for contour in (Joined(left, right, x=0.0), right)
-    )
+    joined, alone = (trace(sweep_frame_of(one)).first_angle for one in (Joined(left, right, x=0.0), right))
     assert joined == pytest.approx(alone, rel=1e-14)
 
 
@@ -423,18 +359,3 @@ def test_out_of_contact_there_is_no_state():
     inside = paths.states(np.zeros(2, dtype=np.intp), np.array([paths.first_angle[0] + 1e-6, paths.snap_angle[0]]))
     assert np.all(inside.wrench.phase != NONE)
     assert inside.parameter[1] == pytest.approx(paths.snap_parameter[0], abs=1e-14)
-
-
-def test_the_dense_corner_is_where_arc_length_is_one():
-    """Profile II, q = 0.5, by bisection."""
-
-    def excess(alpha):
-        x = np.tan(alpha)
-        return tangential_arclength(x, 0.5 * x * x + 0.5, alpha) - 1
-
-    corner = brentq(excess, 0.02, 0.2, xtol=1e-15)
-    paths = trace(sweep_frame_of(Parabola(0.5, 0.5)), **SCAN)
-    assert SnapOff(int(paths.snap_off[0])) == SnapOff.CORNER
-    assert paths.snap_parameter[0] == pytest.approx(corner, abs=1e-12)
-    phases = states_at(paths, np.zeros(2, dtype=np.intp), corner + np.array([1e-9, -1e-9])).wrench.phase
-    np.testing.assert_array_equal(phases, [TANGENTIAL, TIP])

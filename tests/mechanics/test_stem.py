@@ -112,22 +112,6 @@ def test_a_stiff_first_piece_is_a_stem(curvature, drive):
         np.testing.assert_allclose(one.record[name], other.record[name], atol=1e-4)
 
 
-@pytest.mark.parametrize("name", RODS)
-def test_a_stem_that_vanishes_is_none(name):
-    rod = RODS[name]
-    short, without = (
-        tb.scan(
-            CIRCLE,
-            rig=Rig(
-                rod=tb.Rod(rest_curvature=rod.rest_curvature, taper=rod.taper, stem=stem), unknown={"friction": 0.1}
-            ),
-        )
-        for stem in (1e-7, 0.0)
-    )
-    assert short.sweeps[0].snap_off.drive_angle == pytest.approx(without.sweeps[0].snap_off.drive_angle, abs=1e-6)
-    np.testing.assert_allclose(short.record.holding_moment, without.record.holding_moment, atol=1e-4)
-
-
 def test_backward_sweeps_are_mirror_images():
     forward, backward = (
         tb.scan(
@@ -220,12 +204,7 @@ def test_the_drawn_rod_goes_from_the_pivot_to_its_contact(name):
 
 def test_a_file_states_the_stem(tmp_path):
     rod = Rod(0.05, 1e-8, 2e-4, rest_curvature=lambda s: -200.0 * s, stem=4e-3)
-    contour = tb.contours.Circle(0.015, 0.03)
-    si = tb.scan(contour, rig=Rig(rod=rod), drive_step=0.1, direction="forward").record
-    own = tb.scan(
-        tb.contours.Circle(0.3, 0.6), rig=Rig(rod=rod.in_lengths()), drive_step=0.1, direction="forward"
-    ).record
-    np.testing.assert_allclose(si.holding_moment, rod.moment_unit * own.holding_moment, atol=1e-9 * rod.moment_unit)
+    si = tb.scan(tb.contours.Circle(0.015, 0.03), rig=Rig(rod=rod), drive_step=0.1, direction="forward").record
     assert si.attrs["rod_stem"] == 4e-3
     assert "rod_stem" not in tb.scan(CIRCLE, drive_step=0.1).record.attrs
     for ending in ("csv", "nc"):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tactile_bayes.contours import Joined, Parabola, PowerLaw
 from tactile_bayes.numerics.roots import falling_root
 
 EPS = np.finfo(float).eps
@@ -47,20 +46,6 @@ def test_a_kink_about_which_newton_goes_in_circles():
     truth = (7.22 - np.sqrt(7.22**2 - 4 * 11.9 * 0.1)) / (2 * 11.9)
     found = falling_root(kinked, np.array([0.3]), np.array([-2.0]), np.array([0.093]))
     np.testing.assert_allclose(found, truth, rtol=0, atol=2e-14 * 2.3)
-
-
-def test_the_nearest_point_of_two_joined_parabolas():
-    """Here Newton did go in circles: the slope of the lever arm jumps at the vertex."""
-    contour = Joined(Parabola(3.6397005, 0.92792477, -0.09907712), PowerLaw(3.07444433, 2.0, 0.92792477, -0.09907712))
-    contour = contour.broadcast_to((1,))
-
-    def lever(_i, p):
-        x, y, slope, speed, bend = contour.locate(p)
-        cos, sin = np.cos(slope), np.sin(slope)
-        return x * cos + y * sin, speed + (y * cos - x * sin) * bend
-
-    found = falling_root(lever, np.array([2.0]), np.array([-0.5 * np.pi]))
-    assert abs(lever(0, found)[0][0]) < 1e-12
 
 
 def test_a_flat_root_and_an_infinite_slope():

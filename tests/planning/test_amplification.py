@@ -18,29 +18,18 @@ PROFILE = paper_profile("II", q=0.5)
 # So little noise that every sample is loaded, and its phase certain.
 QUIET = tb.LoadCell(force_noise=5e-6, moment_noise=2e-6)
 THICK = tb.Rod.circular(length=0.2, diameter=5e-3, youngs_modulus=1e9)
+QUIET_SI = tb.LoadCell(force_noise=5e-6 * THICK.force_unit, moment_noise=2e-6 * THICK.moment_unit)
 
 TALKING = ((1.02, 0.01, -0.02), (0.03, 0.97, 0.01), (-0.01, 0.02, 1.01))
 
 
-def in_units_of(cell, rod):
-    return replace(
-        cell, force_noise=cell.force_noise * rod.force_unit, moment_noise=cell.moment_noise * rod.moment_unit
-    )
-
-
 PLANS = {
-    "plain": Plan(PROFILE, Rig(load_cell=QUIET)),
-    "a thick rod in SI": Plan(enlarged(PROFILE, 0.2), Rig(load_cell=in_units_of(QUIET, THICK), rod=THICK)),
-    "a cell that turns": Plan(PROFILE, Rig(load_cell=replace(QUIET, frame="turning", bias=(0.1, -0.1, 0.2)))),
     "cross-talk": Plan(PROFILE, Rig(load_cell=replace(QUIET, gain=TALKING, drive_angle_offset=0.02))),
     "correlated noise": Plan(PROFILE, Rig(load_cell=replace(QUIET, correlation=(0.3, -0.2, 0.5)))),
-    "an encoder with noise": Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6))),
     "all of it turning": Plan(
         enlarged(PROFILE, 0.2),
         Rig(
-            load_cell=replace(
-                in_units_of(QUIET, THICK), drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5)
-            ),
+            load_cell=replace(QUIET_SI, drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5)),
             rod=THICK,
         ),
     ),
@@ -89,16 +78,11 @@ def differences(plan, method, source):
     found = []
     for step in STEPS[method]:
         step = step * units.get(source, plan.rod.force_unit)
-        x, y = (
-            (more - less) / (2.0 * step)
-            for more, less in zip(
-                *(
-                    reconstructed(record.assign({source: record[source] + sign * step}), plan, method)
-                    for sign in (1, -1)
-                ),
-                strict=True,
-            )
+        more, less = (
+            np.array(reconstructed(record.assign({source: record[source] + sign * step}), plan, method))
+            for sign in (1, -1)
         )
+        x, y = (more - less) / (2.0 * step)
         found.append(np.stack([cos * x + sin * y, cos * y - sin * x], axis=1))
     return (4.0 * found[0] - found[1]) / 3.0  # Richardson
 
@@ -163,52 +147,7 @@ def test_standard_deviations_are_those_that_reconstruct_states():
         of = grown.sel(reconstruction=method)
         np.testing.assert_allclose(of.sd_along.values, stated.tangent_sd.values, rtol=1e-3)
         np.testing.assert_allclose(of.sd_across.values, stated.normal_sd.values, rtol=1e-3)
-
-
-def test_the_constrained_estimate_is_never_worse_than_the_raw_one_across_nor_along():
-    """Of all linear unbiased estimates the weighted least-squares one has the least variance (Gauss and Markov)."""
-    for name in AT_ONCE:
-        _, grown = in_the_middle(name)
-        for kind in (grown.sd_along, grown.sd_across):
-            raw, constrained = kind.sel(reconstruction="raw").values, kind.sel(reconstruction="constrained").values
-            assert np.all(constrained <= raw * (1.0 + 1e-9)), name
-
-
-def test_both_directions_are_mirror_images():
-    grown = amplification(Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=1e-6))))
-    forward, backward = (grown.isel(sample=np.flatnonzero(grown.sweep.values == sweep)) for sweep in (0, 1))
-    np.testing.assert_allclose(np.pi - backward.drive_angle.values, forward.drive_angle.values, rtol=0.0, atol=1e-9)
-    far = (forward.after_first_contact > 1e-3) & (forward.before_snap_off > 1e-3)
-    here = np.flatnonzero(far.values)
-    for name in ("sd_along", "sd_across"):
-        np.testing.assert_allclose(forward[name].values[:, here], backward[name].values[:, here], rtol=1e-6)
-    signs = np.array([-1.0, -1.0, 1.0, -1.0])  # of readings in a mirror
-    for name, along in (("gain_along", -1.0), ("gain_across", 1.0)):
-        right = along * signs * backward[name].values[:, here]
-        scale = np.abs(right).max(axis=-1, keepdims=True)
-        np.testing.assert_array_less(np.abs(forward[name].values[:, here] - right) / scale, 1e-6)
-
-
-def test_a_rod_in_si_is_a_scaled_one():
-    """Gains in m/(N m), m/N and m/rad."""
-    rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
-    angles = in_the_middle("plain")[0].drives[0].drive_angles
-    si = amplification(
-        Plan(
-            enlarged(PROFILE, 0.2),
-            Rig(load_cell=in_units_of(QUIET, rod), rod=rod),
-            drive=tb.Rotation(drive_angles=angles),
-        )
-    )
-    plain = in_the_middle("plain")[1]
-    per = rod.length / np.array([*rod.load_units, 1.0])
-    right = np.stack([plain[name].values * per for name in ("gain_along", "gain_across")])
-    found = np.stack([si[name].values for name in ("gain_along", "gain_across")])
-    scale = np.abs(right).max(axis=(0, 2), keepdims=True)
-    np.testing.assert_allclose(found / scale, right / scale, rtol=0.0, atol=1e-8)
-    for name in ("sd_along", "sd_across"):
-        np.testing.assert_allclose(si[name].values, rod.length * plain[name].values, rtol=1e-6)
-        assert (si[name].attrs["units"], plain[name].attrs["units"]) == ("m", "1")
+        assert of.sd_along.attrs["units"] == "m"
 
 
 def test_raw_errors_grow_like_one_over_the_distance_from_first_contact_and_not_toward_snap_off():
@@ -218,13 +157,6 @@ def test_raw_errors_grow_like_one_over_the_distance_from_first_contact_and_not_t
         raw = grown[name].sel(reconstruction="raw")
         np.testing.assert_allclose(raw.sel(event="first contact").values, -1.0, atol=0.02)
         np.testing.assert_allclose(raw.sel(event="snap-off").values, 0.0, atol=0.02)
-
-
-def test_the_drive_angle_alone_does_not_move_raw_contacts_along_the_contour():
-    """Their place along it is holding moment over force, whatever the drive angle is (frictionless, forces fixed)."""
-    grown = in_the_middle("plain")[1].sel(reconstruction="raw", source="drive_angle")
-    np.testing.assert_allclose(grown.gain_along.values, 0.0, atol=1e-12)
-    assert np.abs(grown.gain_across.values).max() > 0.9
 
 
 def test_growth_is_what_single_samples_show():
@@ -237,22 +169,3 @@ def test_growth_is_what_single_samples_show():
         assert sd[0] / sd[1] == pytest.approx(2.0, rel=0.01)
     assert not raw.holds.values[:2].any()  # and first order says so itself
     assert np.isnan(near.growth_along.values).all()  # of three samples no power can be told
-
-
-def test_deviations_are_in_proportion_to_noise_and_gains_are_not_touched_by_it():
-    plan, grown = in_the_middle("an encoder with noise")
-    cell = replace(plan.cell, drive_angle_noise=3.0 * plan.cell.drive_angle_noise)
-    louder = amplification(replace(plan, rig=Rig(load_cell=cell)).with_noise(3.0))
-    for name in ("sd_along", "sd_across"):
-        np.testing.assert_allclose(louder[name].values, 3.0 * grown[name].values, rtol=1e-9)
-    for name in ("gain_along", "gain_across"):
-        scale = np.abs(grown[name].values).max()
-        np.testing.assert_allclose(louder[name].values, grown[name].values, rtol=0.0, atol=1e-9 * scale)
-
-
-def test_the_raw_deviation_is_the_sum_of_squares_of_the_sources():
-    plan, grown = in_the_middle("an encoder with noise")
-    sizes = np.array([*plan.cell.standard_deviations.values(), plan.cell.drive_angle_noise])
-    for name in ("along", "across"):
-        right = np.sqrt(np.sum((grown[f"gain_{name}"].values * sizes) ** 2, axis=-1))
-        np.testing.assert_allclose(grown[f"sd_{name}"].values, right, rtol=1e-9)

@@ -13,12 +13,11 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, StudyError
 from tactile_bayes.planning.amplification import amplification
-from tactile_bayes.planning.error_cell import CellOutcome
-from tactile_bayes.planning.error_map import CELLS, Bands, _identity, error_map
+from tactile_bayes.planning.error_map import Bands, error_map
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.tasks import Workers, open_results_store
+from tactile_bayes.tasks import Workers
 
 SMALL = {
     "contours": ["II"],
@@ -31,21 +30,24 @@ SMALL = {
 }
 
 
+def mapped(**options):
+    return error_map(**(SMALL | options))
+
+
 @cache
 def small():
-    return error_map(**SMALL)
+    return mapped()
 
 
 @pytest.mark.slow
 def test_cells_are_the_same_for_any_number_of_workers():
-    xr.testing.assert_identical(error_map(**{**SMALL, "workers": 2}), small())
+    xr.testing.assert_identical(mapped(workers=2), small())
 
 
 def test_another_seed_draws_other_noise_and_expects_the_same():
     over = {"noise_factor": [1.0], "distance": [0.4]}
-    other, nearer = error_map(**{**SMALL, "rng": 4, "over": over}), small().sel(distance=[0.4])
-    drawn = "rms_along"
-    assert np.all(other[drawn].values != nearer[drawn].values)
+    other, nearer = mapped(rng=4, over=over), small().sel(distance=[0.4])
+    assert np.all(other.rms_along.values != nearer.rms_along.values)
     np.testing.assert_array_equal(other.expected_gap_width.values, nearer.expected_gap_width.values)
 
 
@@ -56,31 +58,20 @@ class KilledError(Exception):
     pass
 
 
-def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
-    whole = small()
-
+def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path):
     def kill(progress):
         if progress.done == 1:
             raise KilledError
 
     with pytest.raises(KilledError):
-        error_map(**{**SMALL, "workers": Workers(1, kill)}, out=tmp_path)
+        mapped(workers=Workers(1, kill), out=tmp_path)
     rows = json.loads((tmp_path / "cells.json").read_text(encoding="utf-8"))["cells"]
     assert [row["number"] for row in rows] == [0]
-    made, seen, original = [], [], error_map.__globals__["error_cell"]
-
-    def counted(task):
-        made.append(task[1])
-        return original(task)
-
-    monkeypatch.setitem(error_map.__globals__, "error_cell", counted)
-    found = error_map(**{**SMALL, "workers": Workers(1, seen.append)}, out=tmp_path)
-    assert made == [1]
+    seen = []
+    for _ in range(2):
+        found = mapped(workers=Workers(1, seen.append), out=tmp_path)
+        xr.testing.assert_identical(found, small())
     assert [(p.done, p.wanted, p.made) for p in seen] == [(2, 2, 1)]
-    xr.testing.assert_identical(found, whole)
-    again = error_map(**SMALL, out=tmp_path)
-    assert made == [1]
-    xr.testing.assert_identical(again, whole)
 
 
 @pytest.mark.parametrize(
@@ -98,39 +89,16 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     ],
     ids=str,
 )
-def test_the_folder_of_another_study_is_refused(tmp_path_factory, other):
-    folder = tmp_path_factory.mktemp("study")
-    with open_results_store(_identity(task_of(SMALL)), folder, CELLS) as store:
-        store.outcomes[0] = CellOutcome({"gap_width": 0.1}, "ok")
-    before = (folder / "cells.json").read_bytes()
+def test_the_folder_of_another_study_is_refused(tmp_path, other):
+    def stop(progress):
+        raise KilledError
+
+    with pytest.raises(KilledError):
+        mapped(workers=Workers(1, stop), out=tmp_path)
+    before = (tmp_path / "cells.json").read_bytes()
     with refused(StudyError, "another experiment", "there", "here"):
-        error_map(**{**SMALL, **other}, out=folder)
-    assert (folder / "cells.json").read_bytes() == before
-
-
-def task_of(options):
-    """What a study is made from, without making it."""
-    kept = {}
-
-    def keep(store, function, task, count, **others):
-        kept["task"] = task
-        return {number: CellOutcome({}, "not made") for number in range(count)}
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(error_map.__globals__, "keep_outcomes", keep)
-        error_map(**options)
-    return kept["task"]
-
-
-def test_an_outcome_comes_back_from_its_row(tmp_path):
-    outcome = CellOutcome({"gap_width": 0.1 + 0.2, "posterior_gap_width": np.nan}, "ok")
-    with open_results_store({}, tmp_path, CELLS) as store:
-        store.outcomes[0] = outcome
-    with open_results_store({}, tmp_path, CELLS) as store:
-        back = store.outcomes[0]
-    assert back.message == "ok"
-    assert back.numbers["gap_width"] == 0.1 + 0.2
-    assert np.isnan(back.numbers["posterior_gap_width"])
+        mapped(**other, out=tmp_path)
+    assert (tmp_path / "cells.json").read_bytes() == before
 
 
 # ---- numbers
@@ -142,16 +110,9 @@ def test_first_order_is_what_small_noise_gives():
     A mean square of some samples has the variance 2 Σ σ⁴/(Σ σ²)², over the replicates.
     """
     replicates, step = 24, np.radians(6.0)
-    found = error_map(
-        ["II"],
-        over={"noise_factor": [0.01]},
-        replicates=replicates,
-        drive=tb.Rotation(drive_step=step),
-        rng=1,
-        workers=1,
-        rig=Rig(unknown="nothing"),
-    ).squeeze()
-    plan = Plan(paper_profile("II", q=0.5), drive=tb.Rotation(drive_step=step)).with_noise(0.01)
+    drive = tb.Rotation(drive_step=step)
+    found = mapped(over={"noise_factor": [0.01]}, replicates=replicates, drive=drive, rng=1).squeeze()
+    plan = Plan(paper_profile("II", q=0.5), drive=drive).with_noise(0.01)
     angles = np.unique(plan.scan.record.drive_angle.values)
     grown = amplification(Plan(plan.contour, Rig(load_cell=plan.cell), drive=tb.Rotation(drive_angles=angles)))
     for method in ("raw", "constrained"):
@@ -168,15 +129,8 @@ def test_first_order_is_what_small_noise_gives():
 
 
 def test_first_order_is_not_what_large_noise_gives():
-    found = error_map(
-        ["II"],
-        over={"noise_factor": [0.01, 100.0]},
-        replicates=3,
-        drive=tb.Rotation(drive_step=0.1),
-        rng=1,
-        workers=1,
-        rig=Rig(unknown="nothing"),
-    ).squeeze()
+    found = mapped(over={"noise_factor": [0.01, 100.0]}, replicates=3, rng=1).squeeze()
+    assert np.all(found.ok + found.without_answer <= 1.0 + 1e-12)
     quiet, loud = found.isel(noise_factor=0), found.isel(noise_factor=1)
     growth = (loud.median_error / quiet.median_error).sel(reconstruction="constrained")
     assert float(growth) < 0.8 * 1e4  # errors end where the rod does
@@ -193,11 +147,12 @@ def test_expected_widths_are_those_of_information():
         assert width == pytest.approx(float(right[f"{kind}_width"]), rel=1e-6), kind
     ends = [sweep.snap_off.contact_x for sweep in plan.scan.sweeps]
     assert float(of.gap_width) == pytest.approx(max(ends) - min(ends))
+    assert np.isnan(small().posterior_gap_width.values).all()  # none was asked for
 
 
 def test_a_map_of_a_rod_in_si_is_a_scaled_one():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
-    found = error_map(**{**SMALL, "rig": Rig(rod=rod, unknown="nothing")})
+    found = mapped(rig=Rig(rod=rod, unknown="nothing"))
     np.testing.assert_array_equal(found.distance.values, small().distance.values)
     np.testing.assert_allclose(found.force_noise.values, rod.force_unit * small().force_noise.values)
     for name in ("rms_along", "rms_across", "expected_gap_width", "gap_width", "median_error"):
@@ -205,16 +160,9 @@ def test_a_map_of_a_rod_in_si_is_a_scaled_one():
         assert (found[name].attrs["units"], small()[name].attrs["units"]) == ("m", "1")
 
 
-def test_shares_are_shares():
-    for name in ("ok", "without_answer"):
-        assert np.all((small()[name].values >= 0.0) & (small()[name].values <= 1.0))
-    assert np.all(small().ok + small().without_answer <= 1.0 + 1e-12)
-    assert np.isnan(small().posterior_gap_width.values).all()
-
-
 @pytest.mark.parametrize("distance", [1.2, 0.005])
 def test_a_rod_that_does_not_reach_leaves_a_message(distance):
-    found = error_map(**{**SMALL, "over": {"distance": [distance, 0.5], "noise_factor": [1.0]}, "replicates": 1})
+    found = mapped(over={"distance": [distance, 0.5], "noise_factor": [1.0]}, replicates=1)
     lost, made = found.isel(distance=0), found.isel(distance=1)
     assert made.message.item() == "ok"
     assert lost.message.item().split(":")[0] in ("ReachError", "ContourError")
@@ -225,8 +173,8 @@ def test_a_rod_that_does_not_reach_leaves_a_message(distance):
 @pytest.mark.slow
 def test_posteriors_are_inferred_in_some_cells():
     """Within a fifth of the widths that are to be expected; a record's own noise makes them differ by a tenth."""
-    options = {**SMALL, "over": {**SMALL["over"], "noise_factor": [0.5, 1.0]}}
-    found = error_map(**{**options, "bands": Bands(posterior_cells=2, posterior_replicates=2)})
+    over = {**SMALL["over"], "noise_factor": [0.5, 1.0]}
+    found, plain = mapped(over=over, bands=Bands(posterior_cells=2, posterior_replicates=2)), mapped(over=over)
     inferred = np.isfinite(found.posterior_gap_width.values).ravel()
     assert inferred.tolist() == [True, False, False, True]
     for kind in ("touched", "gap"):
@@ -234,46 +182,43 @@ def test_posteriors_are_inferred_in_some_cells():
         np.testing.assert_allclose(ratio, 1.0, atol=0.2)
     assert np.all(found.posterior_failed.values.ravel()[inferred] == 0.0)
     for name in ("rms_along", "median_error"):
-        np.testing.assert_array_equal(found[name].values, error_map(**options)[name].values)
+        np.testing.assert_array_equal(found[name].values, plain[name].values)
 
 
 # ---- what is refused
 
 
+AXES = ([], 0.5, ["near"], [[0.5]], [0.5, -0.1], [0.0], [np.inf], [1.0, 2.0, 1.0])
+
+
 @pytest.mark.parametrize("axis", ["distance", "noise_factor"])
-@pytest.mark.parametrize(
-    "numbers", [[], 0.5, ["near"], [[0.5]], [0.5, -0.1], [0.0], [np.inf], [1.0, 2.0, 1.0]], ids=str
-)
+@pytest.mark.parametrize("numbers", AXES, ids=str)
 def test_bad_axes_are_refused(axis, numbers):
     with refused(ParameterError, **{axis: numbers}):
-        error_map(**{**SMALL, "over": {axis: numbers}})
+        mapped(over={axis: numbers})
+
+
+WRONG = {
+    "over": [[0.5]],
+    "contours": ["II", []],
+    "replicates": [0, 2.0],
+    "rng": [-1],
+    "rig": ["bias"],
+    "drive": [None, tb.Rotation((0.0, 0.1))],
+    "bands": [0.9],
+}
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("call", "wrong"),
     [
-        {"over": [0.5]},
-        {"contours": "II"},
-        {"contours": []},
-        {"replicates": 0},
-        {"replicates": 2.0},
-        {"rng": -1},
-        {"rig": "bias"},
-        {"drive": None},
-        {"drive": tb.Rotation((0.0, 0.1))},
-        {"bands": 0.9},
+        *((mapped, {name: value}) for name, values in WRONG.items() for value in values),
+        *((Bands, wrong) for wrong in ({"posterior_cells": -1}, {"posterior_replicates": 0}, {"probability": 1.0})),
     ],
-    ids=str,
 )
-def test_bad_arguments_are_refused(wrong):
+def test_bad_arguments_are_refused(call, wrong):
     with refused(ParameterError, **wrong):
-        error_map(**{**SMALL, **wrong})
-
-
-@pytest.mark.parametrize("wrong", [{"posterior_cells": -1}, {"posterior_replicates": 0}, {"probability": 1.0}], ids=str)
-def test_bad_bands_are_refused(wrong):
-    with refused(ParameterError, **wrong):
-        Bands(**wrong)
+        call(**wrong)
 
 
 @pytest.mark.parametrize(
@@ -289,4 +234,4 @@ def test_bad_bands_are_refused(wrong):
 )
 def test_what_cannot_be_studied_is_refused(wrong, named):
     with refused(ParameterError, named):
-        error_map(**{**SMALL, **wrong})
+        mapped(**wrong)

@@ -121,23 +121,19 @@ def test_places_are_evenly_within_the_sweeps():
         length = abs(sweep.snap_off.drive_angle - sweep.first_contact.drive_angle)
         np.testing.assert_allclose(np.sort(found.after_first_contact.values[of]), length * (np.arange(6) + 0.5) / 6)
         np.testing.assert_allclose((found.after_first_contact + found.before_snap_off).values[of], length)
+    same, other = (noise_shares(QUIET, rng=seed, samples=4, states=6, methods=("raw",)).share for seed in (1, 2))
+    np.testing.assert_array_equal(same.values, found.share.values)
+    assert np.any(other.values != found.share.values)
 
 
-def test_the_same_seed_gives_the_same_and_another_one_not():
-    def made(seed):
-        return noise_shares(QUIET, rng=seed, samples=16, states=2, methods=("raw",)).share.values
-
-    np.testing.assert_array_equal(made(1), made(1))
-    assert np.any(made(1) != made(2))
-
-
-@pytest.mark.parametrize("samples", [1000, 1, 0, -4, 64.0, True, "64"])
-def test_samples_that_are_no_power_of_two_are_refused(samples):
-    with refused(ParameterError, samples=samples):
-        noise_shares(QUIET, rng=1, samples=samples)
-
-
-@pytest.mark.parametrize("states", [1, 0, 2.0, True])
-def test_too_few_states_are_refused(states):
-    with refused(ParameterError, states=states):
-        noise_shares(QUIET, rng=1, samples=16, states=states)
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        *({"samples": samples} for samples in (1000, 1, 0, -4, 64.0, True, "64")),
+        *({"states": states} for states in (1, 0, 2.0, True)),
+    ],
+    ids=str,
+)
+def test_samples_that_are_no_power_of_two_and_too_few_states_are_refused(wrong):
+    with refused(ParameterError, **wrong):
+        noise_shares(QUIET, rng=1, **({"samples": 16} | wrong))

@@ -37,58 +37,33 @@ CONTOURS = {
 
 
 @pytest.mark.parametrize("name", CONTOURS)
-def test_the_family_builds_the_contour_back(name):
+def test_the_family_builds_the_contour_back_and_an_enlarged_one(name):
     contour = CONTOURS[name]
     found, values = family_parameters(contour)
     assert found == name
     family = family_named(found)
     assert tuple(values) == family.parameters
     np.testing.assert_allclose(family.build(*values.values()).height(X), contour.height(X), rtol=1e-13)
-
-
-@pytest.mark.parametrize("name", CONTOURS)
-@pytest.mark.parametrize("factor", [0.2, 3.0])
-def test_an_enlarged_contour_has_all_lengths_enlarged(name, factor):
-    contour = CONTOURS[name]
-    larger = enlarged(contour, factor)
-    np.testing.assert_allclose(larger.height(factor * X), factor * contour.height(X), rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("contour", "named"),
-    [
-        (tb.contours.from_points(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21) ** 2 + 0.5), "family"),
-        (tb.contours.from_function(lambda x: np.cosh(x) - 0.5, (-1.0, 1.0)), "power law"),
-        (Parabola([0.5, 0.6], 0.5), "single"),
-        ("II", "'II'"),
-        (None, None),
-    ],
-)
-def test_what_has_no_parameters_is_refused_with_the_correction(contour, named):
-    with refused(ParameterError, named):
-        family_parameters(contour)
+    for factor in (0.2, 3.0):
+        larger = enlarged(contour, factor)
+        np.testing.assert_allclose(larger.height(factor * X), factor * contour.height(X), rtol=1e-12)
 
 
 # ---- plans
 
 
-def test_a_plan_has_the_record_of_its_scan():
-    plan = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=0.05))
-    scanned = tb.scan(PROFILE, drive_step=0.05).record
-    for name in (*CHANNELS, "drive_angle"):
-        np.testing.assert_array_equal(plan.record[name].values, scanned[name].values)
-
-
 def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
     bias, gain = (0.1, -0.2, 0.3), ((1.1, 0.0, 0.0), (0.0, 0.9, 0.1), (0.0, 0.0, 1.0))
-    known = {
-        "bias": bias,
-        "gain": gain,
-        "lever": (0.01, 0.02),
-        "drive_angle_offset": 0.05,
-        "drive_angle_backlash": 0.02,
-    }
-    cell = replace(CELL, **known, drive_angle_noise=0.01, bias_uncertainty=(1.0, 1.0, 1.0))
+    encoder = {"drive_angle_offset": 0.05, "drive_angle_backlash": 0.02}
+    cell = replace(
+        CELL,
+        bias=bias,
+        gain=gain,
+        lever=(0.01, 0.02),
+        **encoder,
+        drive_angle_noise=0.01,
+        bias_uncertainty=(1.0, 1.0, 1.0),
+    )
     plan = Plan(PROFILE, Rig(load_cell=cell), drive=tb.Rotation(drive_step=0.05))
     scanned = tb.scan(PROFILE, drive_step=0.05).record
     loads, read = (np.stack([r[name].values for name in CHANNELS]) for r in (scanned, plan.record))
@@ -119,15 +94,15 @@ def test_every_family_has_a_model(name):
     np.testing.assert_array_equal(plan.point[:-1], list(family_parameters(CONTOURS[name])[1].values()))
 
 
-def test_priors_that_are_given_are_those_of_the_model():
+def test_what_is_given_of_family_and_rig_is_that_of_the_model():
     prior = stats.norm(0.5, 0.01)
-    plan = Plan(
-        PROFILE,
-        Rig(load_cell=CELL, unknown={**NOTHING, "friction": stats.halfnorm(scale=0.1)}),
-        family=Family("parabola", q=prior),
-    )
+    rig = Rig(unknown={**NOTHING, "friction": stats.halfnorm(scale=0.1), "length": 1.0, "noise_scale": 1.0})
+    plan = Plan(PROFILE, rig, family=Family("parabola", q=prior))
     assert plan.model.priors["q"] is prior
-    assert plan.model.forward_parameters == ("a", "q", "x_c", "friction")
+    assert plan.model.names == ("a", "q", "x_c", "friction")
+    plan = Plan(PROFILE, Rig(unknown="nothing"), drive=tb.Rotation(drive_step=0.1), family=Family("parabola", q=0.5))
+    assert plan.model.names == ("a", "x_c", "noise_scale")
+    np.testing.assert_array_equal(plan.point, [0.5, 0.0, 1.0])
 
 
 def test_noise_grows_by_a_factor_and_nothing_else():
@@ -146,44 +121,33 @@ def test_without_a_load_cell_there_is_the_usual_one():
     assert Plan(Parabola(2.5, 0.1), Rig(rod=rod)).cell == usual_load_cell(rod)
 
 
+NO_FAMILY = tb.contours.from_points(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21) ** 2 + 0.5)
+COSH = tb.contours.from_function(lambda x: np.cosh(x) - 0.5, (-1.0, 1.0))
+
+
 @pytest.mark.parametrize(
-    ("cell", "silent"),
+    ("options", "named"),
     [
-        (tb.LoadCell(force_noise=0.05), "holding_moment"),
-        (tb.LoadCell(moment_noise=0.02), "force_x, force_y"),
-        (tb.LoadCell(), "holding_moment, force_x, force_y"),
-        (replace(CELL, degrees_of_freedom=2.0), "holding_moment, force_x, force_y"),
+        ({"contour": NO_FAMILY}, ["family"]),
+        ({"contour": COSH}, ["power law"]),
+        ({"contour": Parabola([0.5, 0.6], 0.5)}, ["one contour"]),
+        ({"contour": "II"}, ["'II'"]),
+        ({"contour": None}, ["None"]),
+        ({"rig": Rig(load_cell=tb.LoadCell(force_noise=0.05))}, ["holding_moment", "LoadCell"]),
+        ({"rig": Rig(load_cell=tb.LoadCell(moment_noise=0.02))}, ["force_x, force_y", "LoadCell"]),
+        ({"rig": Rig(load_cell=tb.LoadCell())}, ["holding_moment, force_x, force_y", "LoadCell"]),
+        ({"rig": Rig(load_cell=replace(CELL, degrees_of_freedom=2.0))}, ["holding_moment, force_x, force_y"]),
+        ({"rig": 0.2}, ["rig", "0.2"]),
+        ({"rig": CELL}, ["rig", "LoadCell"]),
+        ({"family": "parabola"}, ["family", "'parabola'"]),
+        ({"family": Family("circle")}, ["circle", "parabola"]),
+        ({"family": Family("parabola", q=0.4)}, ["q", "0.4", "0.5"]),
     ],
+    ids=lambda value: "" if isinstance(value, dict) else str(value[0]),
 )
-def test_a_channel_without_noise_is_refused_by_name(cell, silent):
-    with refused(ParameterError, silent, "LoadCell"):
-        Plan(PROFILE, Rig(load_cell=cell))
-
-
-@pytest.mark.parametrize("options", [{"rig": 0.2}, {"rig": CELL}, {"family": "parabola"}])
-def test_what_is_none_is_refused(options):
-    with refused(ParameterError, **options):
-        Plan(PROFILE, **options)
-
-
-def test_numbers_that_are_as_stated_are_known():
-    plan = Plan(PROFILE, Rig(unknown={**NOTHING, "length": 1.0, "noise_scale": 1.0, "discrepancy": 0.0}))
-    assert plan.model.names == ("a", "q", "x_c")
-
-
-@pytest.mark.parametrize(
-    ("family", "words"),
-    [(Family("circle"), ("circle", "parabola")), (Family("parabola", q=0.4), ("q", "0.4", "0.5"))],
-)
-def test_the_family_of_another_contour_is_refused(family, words):
-    with refused(ParameterError, *words):
-        Plan(PROFILE, family=family)
-
-
-def test_what_is_known_of_the_contour_is_none_of_the_parameters():
-    plan = Plan(PROFILE, Rig(unknown="nothing"), drive=tb.Rotation(drive_step=0.1), family=Family("parabola", q=0.5))
-    assert plan.model.names == ("a", "x_c", "noise_scale")
-    np.testing.assert_array_equal(plan.point, [0.5, 0.0, 1.0])
+def test_what_does_not_go_together_is_refused(options, named):
+    with refused(ParameterError, *named):
+        _ = Plan(**({"contour": PROFILE} | options)).model
 
 
 # ---- covariance over a whole record

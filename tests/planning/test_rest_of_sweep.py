@@ -45,15 +45,6 @@ def test_it_is_what_the_rest_then_adds(measured, stream):
 
 
 @pytest.mark.slow
-def test_fewer_samples_add_less(measured, stream):
-    few, more = (
-        tb.planning.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, rng=1).width
-        for end in (44, 56)
-    )
-    assert np.all(more < few)
-
-
-@pytest.mark.slow
 def test_no_more_draws_are_taken_than_there_are(measured, stream):
     angles = measured.drive_angle[SO_FAR:44]
     every, more = (tb.planning.rest_of_sweep(stream.posterior(), angles, X, rng=1, draws=count) for count in (500, 600))

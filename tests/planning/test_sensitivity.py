@@ -55,10 +55,9 @@ def test_the_groups_are_those_of_single_analyses():
 def test_without_a_contour_it_is_profile_ii_scaled_to_the_rod():
     assert plain().attrs["contour"] == repr(PROFILE)
     assert in_si().attrs["contour"] == "Parabola(a=2.5, q=0.1, x_c=0.0)"
-    np.testing.assert_allclose(in_si()["required_noise"].band_width, 0.2 * plain()["required_noise"].band_width)
-    np.testing.assert_allclose(
-        in_si()["required_noise"].noise_factor, plain()["required_noise"].noise_factor, rtol=1e-4
-    )
+    si, dimensionless = (tree["required_noise"] for tree in (in_si(), plain()))
+    np.testing.assert_allclose(si.band_width, 0.2 * dimensionless.band_width)
+    np.testing.assert_allclose(si.noise_factor, dimensionless.noise_factor, rtol=1e-4)
 
 
 def test_words_are_in_the_units_of_the_record():
@@ -80,9 +79,8 @@ def test_words_say_the_numbers():
     needed = in_si()["required_noise"]
     lines = [line for line in words(in_si()) if line.startswith("A mean band")]
     assert len(lines) == 5
-    assert (
-        f"of {1e3 * float(needed.band_width[0]):.3g} mm needs {1e3 * float(needed.force_noise[0]):.2g} mN" in lines[0]
-    )
+    width, noise = 1e3 * float(needed.band_width[0]), 1e3 * float(needed.force_noise[0])
+    assert f"of {width:.3g} mm needs {noise:.2g} mN" in lines[0]
     (line,) = [line for line in words(in_si()) if "Toward first contact" in line]
     assert "to the power of -1.0" in line
 
@@ -98,14 +96,6 @@ def test_words_name_the_channel_that_is_missed_most():
     assert f"{float(mean.max()):.1f} times" in line
 
 
-def test_only_what_is_asked_for_is_made():
-    tree = sensitivity(rng=1, parts=["required_noise"], band_widths=[0.002])
-    assert set(tree.children) == {"required_noise"}
-    assert [line[:11] for line in words(tree)] == ["A mean band"]
-    needed = tree["required_noise"]
-    assert needed.sizes == {"band_width": 1}
-
-
 def test_an_answer_can_be_written_and_read(tmp_path):
     tree = plain()
     tree.to_netcdf(tmp_path / "sensitivity.nc", engine="h5netcdf")
@@ -116,42 +106,36 @@ def test_an_answer_can_be_written_and_read(tmp_path):
         assert back.attrs["words"] == tree.attrs["words"]
 
 
-def test_a_wide_band_is_what_priors_give():
-    tree = sensitivity(rng=1, parts=["required_noise"], band_widths=[100.0])
-    (line,) = words(tree)
-    assert re.search(r"\b100 L .*\bpriors\b", line)
+LOUD = Rig(load_cell=tb.LoadCell(force_noise=50.0, moment_noise=20.0))
 
 
-def test_where_first_order_does_not_hold_the_words_say_so():
-    loud = tb.LoadCell(force_noise=50.0, moment_noise=20.0)
-    tree = sensitivity(rng=1, parts=["amplification"], rig=Rig(load_cell=loud))
-    assert any("for no raw" in line for line in words(tree))
-
-
-@pytest.mark.parametrize("parts", [["informations"], "information", [], ["information", "gap"]])
-def test_parts_that_are_none_are_refused(parts):
-    with refused(ParameterError, parts=parts):
-        sensitivity(rng=1, parts=parts)
-
-
-def test_a_channel_without_noise_is_refused_by_name():
-    with refused(ParameterError, "force_x, force_y"):
-        sensitivity(rng=1, rig=Rig(load_cell=tb.LoadCell(moment_noise=0.02)))
-
-
-def test_a_contour_of_no_family_is_refused_with_the_correction():
-    x = np.linspace(-1.0, 1.0, 41)
-    for parts in (PARTS, ["information"]):
-        with refused(ParameterError, "family", "parabola, circle, ellipse"):
-            sensitivity(tb.contours.from_points(x, 0.5 * x**2 + 0.5), rng=1, parts=parts)
-
-
-def test_a_contour_out_of_reach_is_refused():
-    with refused(ReachError, "out of reach"):
-        sensitivity(Parabola(0.5, 1.5), rng=1)
-
-
-def test_one_sweep_has_no_gap_to_speak_of():
-    tree = sensitivity(PROFILE, rng=1, drive=tb.Rotation(direction="backward", drive_step=STEP), parts=["information"])
-    (line,) = [line for line in words(tree) if "expected width" in line]
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"parts": ["required_noise"], "band_widths": [100.0]}, r"\b100 L .*\bpriors\b"),
+        ({"parts": ["amplification"], "rig": LOUD}, "for no raw"),
+        ({"parts": ["information"], "drive": tb.Rotation(direction="backward", drive_step=STEP)}, "expected width"),
+    ],
+    ids=["a band that priors give", "first order does not hold", "one sweep"],
+)
+def test_words_say_what_is_particular(options, said):
+    tree = sensitivity(rng=1, **options)
+    assert set(tree.children) == set(options["parts"])  # only what is asked for is made
+    (line,) = [line for line in words(tree) if re.search(said, line)]
     assert "gap" not in line
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "named"),
+    [
+        ({"parts": ["informations"]}, ParameterError, ["parts", "['informations']"]),
+        ({"parts": "information"}, ParameterError, ["parts", "'information'"]),
+        ({"parts": []}, ParameterError, ["parts", "[]"]),
+        ({"parts": ["information", "gap"]}, ParameterError, ["parts", "['information', 'gap']"]),
+        ({"rig": Rig(load_cell=tb.LoadCell(moment_noise=0.02))}, ParameterError, ["force_x, force_y"]),
+        ({"contour": Parabola(0.5, 1.5)}, ReachError, ["out of reach"]),
+    ],
+)
+def test_what_is_impossible_is_refused(options, error, named):
+    with refused(error, *named):
+        sensitivity(rng=1, **options)

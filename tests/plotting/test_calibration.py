@@ -19,8 +19,6 @@ from tactile_bayes.errors import ParameterError
 COUNT = 100  # replicates in most tests: as many as there are ranks, and bands are made once
 UNIFORM = np.arange(COUNT)
 LOW = (DRAWS * np.linspace(0.0, 1.0, COUNT) ** 2).astype(int)  # ranks of truths that lie low among draws
-
-
 LEVEL = 0.001
 
 
@@ -77,20 +75,16 @@ def test_each_quantity_has_a_panel_and_uniform_ranks_are_unmarked():
     assert " 1 line in 20 " in band_line
 
 
-def test_the_line_is_what_ranks_have_more_than_uniform_ones():
+def test_the_line_is_what_ranks_have_more_than_uniform_ones_and_the_band_is_the_simultaneous_one():
     (ax,) = plotting.calibration_ranks(calibration_of(q=LOW))
     np.testing.assert_allclose(curve(ax).get_xdata(), np.arange(DRAWS + 1) / DRAWS)
-    for rank in (0, 10, 50, 98, 99):
-        expected = np.mean(rank >= LOW) - (rank + 1) / (DRAWS + 1)
-        assert curve(ax).get_ydata()[rank] == pytest.approx(expected, abs=1e-12)
+    ranks = np.arange(DRAWS + 1)
+    expected = (LOW[:, None] <= ranks).mean(axis=0) - (ranks + 1) / (DRAWS + 1)
+    np.testing.assert_allclose(curve(ax).get_ydata(), expected, rtol=0, atol=1e-12)
     assert curve(ax).get_ydata().min() >= 0.0  # truths are low where posteriors are high
-
-
-def test_the_band_is_the_simultaneous_one():
-    (ax,) = plotting.calibration_ranks(calibration_of(q=UNIFORM))
     low, high = simultaneous_band(COUNT, DRAWS, 0.95)
-    expected = np.arange(1, DRAWS + 1) / (DRAWS + 1)
-    np.testing.assert_allclose(band(ax), [(low - expected).min(), (high - expected).max()], atol=1e-12)
+    uniform = np.arange(1, DRAWS + 1) / (DRAWS + 1)
+    np.testing.assert_allclose(band(ax), [(low - uniform).min(), (high - uniform).max()], atol=1e-12)
 
 
 def test_skewed_ranks_are_marked_in_colour_and_in_words():
@@ -131,12 +125,9 @@ def test_where_a_quantity_has_fewer_ranks_its_panel_says_so():
     panels = plotting.calibration_ranks(calibration_of(a=np.tile(UNIFORM, 2), snap_off_forward=few))
     assert [texts(ax) for ax in panels] == [["p = 1"], ["p = 1 (of 100)"]]
     assert band(panels[1])[1] > band(panels[0])[1]
-
-
-def test_too_few_replicates_are_not_judged():
-    panels = plotting.calibration_ranks(calibration_of([np.nan], a=UNIFORM))
-    assert texts(panels[0]) == ["too few to test"]
-    assert re.fullmatch("Too few .* 100 replicates", heading(panels)[0])
+    untested = plotting.calibration_ranks(calibration_of([np.nan], a=UNIFORM))
+    assert texts(untested[0]) == ["too few to test"]
+    assert re.fullmatch("Too few .* 100 replicates", heading(untested)[0])
 
 
 def test_panels_share_their_axes_and_labels_do_not_overlap():
@@ -171,22 +162,24 @@ def test_small_figures_hold_their_labels(count):
     assert above.x1 < figure.bbox.x1
 
 
-def test_ranks_are_drawn_into_axes_given():
-    found = calibration_of(a=UNIFORM, q=LOW)
+def test_ranks_in_axes_given_have_labels_of_their_own_and_no_title():
     figure, axes = plt.subplots(1, 2)
-    assert list(plotting.calibration_ranks(found, axes=axes)) == list(axes)
+    plotting.calibration_ranks(calibration_of(a=UNIFORM, q=LOW), axes=axes)
     assert axes[0].get_xlabel() == "rank of the truth / 99"
     assert figure.get_suptitle() == ""
-    with refused(ParameterError, "axes", "(1,)", "(2,)"):
-        plotting.calibration_ranks(found, axes=axes[:1])
 
 
-def test_without_any_posterior_there_is_nothing_to_draw():
-    with refused(ParameterError, "7 replicates"):
-        plotting.calibration_ranks(calibration_of(q=np.full(7, -1)))
-    empty = calibration_of(q=UNIFORM).isel(quantity=[])
-    with refused(ParameterError, "100 replicates"):
-        plotting.calibration_ranks(empty)
+@pytest.mark.parametrize(
+    ("calibration", "options", "named"),
+    [
+        (calibration_of(a=UNIFORM, q=LOW), {"axes": [None]}, ["axes", "(1,)", "(2,)"]),
+        (calibration_of(q=np.full(7, -1)), {}, ["7 replicates"]),
+        (calibration_of(q=UNIFORM).isel(quantity=[]), {}, ["100 replicates"]),
+    ],
+)
+def test_ranks_that_cannot_be_drawn_are_refused(calibration, options, named):
+    with refused(ParameterError, *named):
+        plotting.calibration_ranks(calibration, **options)
 
 
 # --- Coverage -------------------------------------------------------------------------------------------------------
@@ -205,10 +198,16 @@ def bars(ax):
 def test_claims_have_rows_in_their_order():
     ax = plotting.coverage(covering([0.88, 0.91, 0.85], [0.02, 0.01, 0.03], [200, 200, 150]))
     assert row_labels(ax) == list(CLAIMS.values())[:3]
+    assert row_labels(plotting.coverage(covering([0.9], [0.02], [20], claims=["friction"]))) == ["friction"]
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first claim is on top
     assert dots(ax) == [0.88, 0.91, 0.85]
     assert {"88.0 % of 200", "91.0 % of 200", "85.0 % of 150"} <= set(texts(ax))
     np.testing.assert_allclose([bars(ax)[i] for i in range(3)], [[0.84, 0.92], [0.89, 0.93], [0.79, 0.91]])
+    without_error = plotting.coverage(covering([0.9, 1.0], [np.nan, 0.01], [200, 200]))
+    assert dots(without_error) == [0.9, 1.0]
+    assert list(bars(without_error)) == [1]
+    np.testing.assert_allclose(bars(without_error)[1], [0.98, 1.0])  # shares go no further
+    without_error.figure.canvas.draw()
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.9])
@@ -221,14 +220,6 @@ def test_the_line_is_at_the_probability_stated(probability):
     assert ax.get_xlim()[1] >= 1.0
 
 
-def test_without_a_standard_error_there_is_a_dot_and_no_bar():
-    ax = plotting.coverage(covering([0.9, 1.0], [np.nan, 0.01], [200, 200]))
-    assert dots(ax) == [0.9, 1.0]
-    assert list(bars(ax)) == [1]
-    np.testing.assert_allclose(bars(ax)[1], [0.98, 1.0])  # shares go no further
-    ax.figure.canvas.draw()
-
-
 def test_claims_of_too_few_replicates_are_named_below():
     ax = plotting.coverage(covering([0.9, 1.0, np.nan, 0.5], [0.02, np.nan, np.nan, 0.5], [200, 1, 0, 2]))
     names = list(CLAIMS.values())
@@ -239,19 +230,7 @@ def test_claims_of_too_few_replicates_are_named_below():
     box = note.get_window_extent()
     assert not box.overlaps(ax.xaxis.label.get_window_extent())
     assert ax.figure.bbox.y0 <= box.y0
-
-
-def test_where_no_claim_is_left_the_axes_say_so():
-    ax = plotting.coverage(covering([np.nan, 1.0], [np.nan, np.nan], [0, 1]))
-    (said,) = texts(ax)
+    none = plotting.coverage(covering([np.nan, 1.0], [np.nan, np.nan], [0, 1]))
+    (said,) = texts(none)
     assert " 2 replicates" in said
-    assert not ax.axison
-
-
-def test_a_claim_of_another_name_is_called_by_it():
-    assert row_labels(plotting.coverage(covering([0.9], [0.02], [20], claims=["friction"]))) == ["friction"]
-
-
-def test_coverage_is_drawn_into_axes_given():
-    _, ax = plt.subplots()
-    assert plotting.coverage(covering([0.9], [0.02], [20]), ax=ax) is ax
+    assert not none.axison

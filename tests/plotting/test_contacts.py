@@ -35,15 +35,6 @@ def outlines(ax):
     return [part for part in ax.collections if getattr(part, "levels", None) is not None]
 
 
-def test_they_draw_where_they_are_told_and_nowhere_else(contacts, posterior):
-    for function, data in ((contact_ellipses, contacts), (contact_regions, posterior)):
-        ax = own_axes()
-        assert function(data, ax=ax) is ax
-        assert not plt.get_fignums()
-        assert "x" in ax.get_xlabel()
-        assert ax.get_aspect() == 1.0
-
-
 def test_ellipses_are_those_of_the_covariance(contacts):
     ax = contact_ellipses(contacts, probability=0.9, samples=[45, 120], ax=own_axes())
     ellipses = [patch for patch in ax.patches if isinstance(patch, Ellipse)]
@@ -63,11 +54,6 @@ def test_ellipses_are_those_of_the_covariance(contacts):
         assert colors.to_hex(ellipse.get_edgecolor()) == colors.to_hex(plotting.PALETTE[phase])
 
 
-def test_by_default_a_dozen_is_drawn(contacts):
-    ax = contact_ellipses(contacts, ax=own_axes())
-    assert len([patch for patch in ax.patches if isinstance(patch, Ellipse)]) == 12
-
-
 def test_regions_are_outlined_at_their_level(posterior):
     ax = contact_regions(posterior, probability=0.5, ax=own_axes())
     drawn = outlines(ax)
@@ -78,12 +64,14 @@ def test_regions_are_outlined_at_their_level(posterior):
         np.testing.assert_allclose(region.density(*rim.T), region.level, rtol=0.25)
 
 
-def test_labels_say_probability_and_phase(contacts, posterior):
-    assert labels(contact_ellipses(contacts, probability=0.5, samples=[45], ax=own_axes()))[0] == (
-        "50 % ellipse, tangential contact"
-    )
-    words = labels(contact_regions(posterior, probability=0.95, truth=paper_profile("II", q=0.5), ax=own_axes()))
-    assert words[:2] == ["95 % region, tip contact", "95 % region, tangential contact"]
+def test_labels_say_probability_phase_and_unit(contacts, posterior):
+    ax = contact_ellipses(contacts, probability=0.5, samples=[45], ax=own_axes())
+    assert labels(ax)[0] == "50 % ellipse, tangential contact"
+    ax = contact_regions(posterior, probability=0.95, truth=paper_profile("II", q=0.5), ax=own_axes())
+    assert labels(ax)[:2] == ["95 % region, tip contact", "95 % region, tangential contact"]
+    assert ax.get_aspect() == 1.0
+    in_si = reconstruct(measured("SI"), method="constrained", rig=Rig(load_cell=SI_CELL))
+    assert "m]" in contact_ellipses(in_si, ax=own_axes()).get_xlabel()
 
 
 def test_the_true_contour_leaves_the_limits_alone(posterior):
@@ -91,12 +79,6 @@ def test_the_true_contour_leaves_the_limits_alone(posterior):
     true = contact_regions(posterior, truth=paper_profile("II", q=0.5), ax=own_axes())
     assert true.get_xlim() == plain.get_xlim()
     assert true.get_ylim() == plain.get_ylim()
-
-
-def test_si_axes_are_labelled_in_their_unit():
-    record = measured("SI")
-    ax = contact_ellipses(reconstruct(record, method="constrained", rig=Rig(load_cell=SI_CELL)), ax=own_axes())
-    assert "mm" in ax.get_xlabel() or "m]" in ax.get_xlabel()
 
 
 def test_samples_without_a_contact_are_refused(contacts, posterior):
@@ -118,6 +100,7 @@ def test_a_region_is_whole_and_a_low_map_is_in_a_low_figure(contacts, posterior)
         wide, high = drawn.figure.get_size_inches()
         assert wide == 7.0
         assert high < 4.0
+    assert len([patch for patch in drawn.patches if isinstance(patch, Ellipse)]) == 12  # by default
     _, given = plt.subplots(figsize=(5.0, 5.0))
     contact_ellipses(contacts, ax=given)
     np.testing.assert_array_equal(given.figure.get_size_inches(), 5.0)

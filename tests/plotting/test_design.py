@@ -54,12 +54,6 @@ def test_of_several_steps_the_map_is_that_of_the_best():
     assert ax.get_legend().get_title().get_text() == "steps of 2.86°"
 
 
-def test_places_without_an_answer_are_grey():
-    ax = design(made_up(XS, YS, missing=[0, 1]))
-    assert np.ma.getmaskarray(tiles(ax).get_array()).sum() == 2
-    assert "out of reach" in labels(ax)
-
-
 @pytest.mark.parametrize(("criterion", "words"), [("gap", "width that no sweep touches"), ("information", "[nat]")])
 def test_other_criteria_have_maps_too(criterion, words):
     found = made_up(XS, YS, criterion=criterion)
@@ -88,7 +82,10 @@ def test_fewer_heights_are_lines(ys):
     assert list(pivot.get_xdata()) == [0.1, 0.1]
 
 
-def test_what_is_no_full_grid_is_lines():
+def test_a_grid_with_gaps_is_grey_there_and_what_is_no_full_grid_is_lines():
+    ax = design(made_up(XS, YS, missing=[0, 1]))
+    assert np.ma.getmaskarray(tiles(ax).get_array()).sum() == 2
+    assert "out of reach" in labels(ax)
     found = made_up(XS, YS).isel(candidate=slice(1, None))
     ax = design(found.assign(best=int(np.argmin(found.width.values))))
     assert len(ax.containers) == 3

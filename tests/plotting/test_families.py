@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
 
 from helpers.comparisons import made_up
-from helpers.pictures import row_labels
+from helpers.pictures import labels, own_axes, row_labels, texts
 from helpers.refusals import refused
 from tactile_bayes import plotting
 from tactile_bayes.comparison.verdict import NONE_FITS
@@ -38,18 +37,17 @@ def line(ax, label):
 
 def test_bars_are_probabilities_and_markers_those_of_other_priors():
     half, twice = [0.2, 0.5, 0.3], [0.05, 0.9, 0.05]
-    (ax,) = plotting.families(made_up([0.1, 0.7, 0.2], half=half, twice=twice))
+    found = made_up([0.1, 0.7, 0.2], half=half, twice=twice)
+    (ax,) = plotting.families(found)
+    assert title(ax) == found.attrs["verdict"]
     np.testing.assert_allclose([bar.get_width() for bar in ax.patches], [0.1, 0.7, 0.2])
     np.testing.assert_array_equal(line(ax, "priors half as wide").get_xdata(), half)
     np.testing.assert_array_equal(line(ax, "priors twice as wide").get_xdata(), twice)
     assert row_labels(ax) == ["parabola", "circle", "ellipse"]
-    assert [text.get_text() for text in ax.texts] == ["0.1", "0.7", "0.2"]
+    assert texts(ax) == ["0.1", "0.7", "0.2"]
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first family is on top
-
-
-def test_the_verdict_stands_above():
-    found = made_up([0.1, 0.7, 0.2])
-    assert title(plotting.families(found)[0]) == found.attrs["verdict"]
+    (none,) = plotting.families(made_up([np.nan, np.nan]))
+    assert (texts(none), len(none.patches)) == (["no probabilities"], 0)
 
 
 def test_what_is_wrong_with_a_family_stands_beside_it():
@@ -72,12 +70,6 @@ def test_where_none_fits_that_is_what_the_figure_says_first():
     assert none.get_xlabel() == "probability: the least wrong"
 
 
-def test_where_there_are_no_probabilities_the_axes_say_so():
-    (ax,) = plotting.families(made_up([np.nan, np.nan]))
-    assert [text.get_text() for text in ax.texts] == ["no probabilities"]
-    assert not ax.patches
-
-
 def test_elpd_differences_have_a_panel_of_their_own():
     found = made_up([0.1, 0.7, 0.2], elpd=[-12.0, 0.0, -1.0])
     panels = plotting.families(found)
@@ -87,6 +79,10 @@ def test_elpd_differences_have_a_panel_of_their_own():
     ends = np.array([bar[:, 0] for bar in bars.lines[2][0].get_segments()])
     np.testing.assert_allclose(np.diff(ends)[:, 0], 2.0 * found.elpd_difference_error)
     assert panels[1].get_xscale() == "linear"
+    panels = plotting.families(made_up([0.0, 0.7, 0.3], sampled=[False, True, True], elpd=[0.0, -1.0, 0.0]))
+    drawn = [bars.lines[0].get_xdata() for bars in panels[1].containers]
+    assert np.isfinite(np.concatenate(drawn)).sum() == 2  # of families that were sampled
+    panels[0].figure.canvas.draw()
 
 
 @pytest.mark.parametrize("worst", [-140.0, -3e5])
@@ -97,17 +93,8 @@ def test_differences_that_are_large_do_not_hide_small_ones(worst):
     assert 3 <= len(panels[1].get_xticks()) <= 5
 
 
-def test_families_that_were_not_sampled_have_no_difference():
-    found = made_up([0.0, 0.7, 0.3], sampled=[False, True, True], elpd=[0.0, -1.0, 0.0])
-    panels = plotting.families(found)
-    drawn = [bars.lines[0].get_xdata() for bars in panels[1].containers]
-    assert np.isfinite(np.concatenate(drawn)).sum() == 2
-    panels[0].figure.canvas.draw()
-
-
-def test_axes_given_are_those_that_return():
-    _, axes = plt.subplots(1, 2)
-    assert list(plotting.families(made_up([0.5, 0.5], elpd=[0.0, -1.0]), axes=axes)) == list(axes)
+def test_axes_that_do_not_fit_are_refused():
+    axes = own_axes(2)
     with refused(ParameterError, "axes", "(2,)", "(1,)"):
         plotting.families(made_up([0.5, 0.5]), axes=axes)
     with refused(ParameterError, "axes", "(2,)", "elpd"):
@@ -129,9 +116,8 @@ def test_contours_of_the_prior_are_drawn_within_the_rods_reach(posterior):
     (circle,) = ax.patches
     assert (circle.center, circle.radius) == ((0.0, 0.0), ROD.length)
     share = posterior["prior"].attrs["share_within_reach"]
-    labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert f"parabola, from the prior\n({100.0 * share:.2g} % of it is within reach)" in labels
-    assert {"rod's reach", "posterior median, where touched", "pivot"} < set(labels)
+    assert f"parabola, from the prior\n({100.0 * share:.2g} % of it is within reach)" in labels(ax)
+    assert {"rod's reach", "posterior median, where touched", "pivot"} < set(labels(ax))
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
 
 
@@ -141,12 +127,7 @@ def test_the_median_is_drawn_where_the_rod_touched(posterior):
     assert np.ptp(drawn.get_xdata()) < 2.0 * ROD.length
     np.testing.assert_allclose(drawn.get_ydata(), CONTOUR.height(drawn.get_xdata()), atol=0.02 * ROD.length)
     without = plotting.prior_contours(posterior, median=False)
-    assert not any("median" in text.get_text() for text in without.get_legend().get_texts())
-
-
-def test_a_prior_is_drawn_without_a_posterior_and_into_axes_given(posterior):
-    _, ax = plt.subplots()
-    assert plotting.prior_contours(posterior.filter(lambda node: node.name != "posterior"), ax=ax) is ax
+    assert not any("median" in label for label in labels(without))
 
 
 # --- Contours from the posterior ------------------------------------------------------------------------------------
@@ -156,10 +137,17 @@ def coloured(ax, colour, alpha):
     return [drawn for drawn in ax.lines if drawn.get_color() == colour and drawn.get_alpha() == alpha]
 
 
+@pytest.mark.parametrize(
+    ("draw", "group"), [(plotting.prior_contours, "posterior"), (plotting.posterior_contours, "prior")]
+)
+def test_one_is_drawn_without_the_other(posterior, draw, group):
+    ax = draw(posterior.filter(lambda node: node.name != group))
+    assert not any(group in label for label in labels(ax))
+
+
 def test_contours_of_the_posterior_are_drawn_over_those_of_the_prior(posterior):
     ax = plotting.posterior_contours(posterior, contours=3, truth=CONTOUR)
-    labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert labels == [
+    assert labels(ax) == [
         "rod's reach",
         "parabola, from the prior",
         "parabola, from the posterior",
@@ -178,9 +166,3 @@ def test_contours_of_the_posterior_are_drawn_over_those_of_the_prior(posterior):
     below, above = (coloured(ax, colours[name], 0.7) for name in colours)
     assert max(drawn.get_zorder() for drawn in below) < min(drawn.get_zorder() for drawn in above)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
-
-
-def test_a_posterior_is_drawn_without_its_prior_and_into_axes_given(posterior):
-    _, ax = plt.subplots()
-    assert plotting.posterior_contours(posterior.filter(lambda node: node.name != "prior"), ax=ax) is ax
-    assert not any("prior" in text.get_text() for text in ax.get_legend().get_texts())

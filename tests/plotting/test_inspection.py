@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tactile_bayes as tb
+from helpers.pictures import labels, own_axes, texts
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 
@@ -29,8 +30,7 @@ def test_readings_events_and_what_stands_out_are_drawn(inspected):
     assert ring.get_xdata().tolist() == [np.degrees(float(record.drive_angle[3]))]
     assert ring.get_ydata().tolist() == [float(record.force_x[3])]
     assert not lines(axes[0, 0], "stands out")
-    labels = [text.get_text() for text in axes[0, 0].get_legend().get_texts()]
-    assert labels == ["forward", "backward", "first contact", "snap-off", "stands out"]
+    assert labels(axes[0, 0]) == ["forward", "backward", "first contact", "snap-off", "stands out"]
     upright = {round(float(line.get_xdata()[0]), 6) for line in axes[0, 0].lines if len(set(line.get_xdata())) == 1}
     between = np.degrees(inspected.sweeps.snap_off_drive_angle.mean("side").values)
     assert set(np.round(between, 6)) <= upright
@@ -45,14 +45,9 @@ def test_unloaded_samples_are_drawn_over_their_noise(inspected):
     assert (low, high) == pytest.approx((float(row.bias - 2 * row.noise), float(row.bias + 2 * row.noise)))
 
 
-def test_a_missing_channel_is_said_to_be_so(measured):
+def test_a_missing_channel_is_said_to_be_so_and_too_few_axes_are_refused(measured, inspected):
     none = ("sample", np.full(measured.sizes["sample"], np.nan), measured.force_x.attrs)
     axes = tb.plotting.inspection(tb.inspect_record(measured.assign(force_x=none)))
-    assert [text.get_text() for text in axes[1, 0].texts] == ["not measured"]
-
-
-def test_axes_that_are_too_few(inspected):
-    from matplotlib.figure import Figure
-
+    assert texts(axes[1, 0]) == ["not measured"]
     with refused(ParameterError, "axes", "(3,)", "(3, 2)"):
-        tb.plotting.inspection(inspected, axes=Figure().subplots(3, 1))
+        tb.plotting.inspection(inspected, axes=own_axes(3))

@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 
 from helpers.pictures import labels, texts
@@ -41,40 +40,28 @@ def study():
     return error_map(["II"], over=over, rig=Rig(unknown="nothing"), **options)
 
 
-def rods(status, width):
-    """Of 2 lengths and 3 diameters."""
+STATUS = [["ok", "ok", "bent too far"], ["does not reach", "ok", "cannot be swept"]]
+WIDTH = [[4e-4, 2e-4, 1e-4], [np.nan, 3e-4, np.nan]]
+
+
+def rods(status=STATUS, width=WIDTH, best=(0.1, 4e-4, 2e-4)):
+    """Of 2 lengths and 3 diameters, with length, diameter and width of the best."""
     metres = {"units": "m"}
-    width = np.array(width, dtype=float)
-    usable = np.where(np.array(status) == "ok", width, np.inf)
-    i, j = np.unravel_index(np.argmin(usable), usable.shape)
-    lengths, diameters = np.array([0.1, 0.2]), np.array([2e-4, 4e-4, 8e-4])
-    is_any = np.isfinite(usable[i, j])
     return xr.Dataset(
         {
-            "width": (("length", "diameter"), width, metres),
+            "width": (("length", "diameter"), np.array(width, dtype=float), metres),
             "status": (("length", "diameter"), status),
-            "best_length": ((), lengths[i] if is_any else np.nan, metres),
-            "best_diameter": ((), diameters[j] if is_any else np.nan, metres),
-            "best_width": ((), width[i, j] if is_any else np.nan, metres),
+            **{f"best_{name}": ((), v, metres) for name, v in zip(("length", "diameter", "width"), best, strict=True)},
         },
-        coords={"length": ("length", lengths, metres), "diameter": ("diameter", diameters, metres)},
+        coords={"length": ("length", [0.1, 0.2], metres), "diameter": ("diameter", [2e-4, 4e-4, 8e-4], metres)},
         attrs={"probability": 0.95, "where": "gap"},
     )
 
 
-SOME = rods(
-    [["ok", "ok", "bent too far"], ["does not reach", "ok", "cannot be swept"]],
-    [[4e-4, 2e-4, 1e-4], [np.nan, 3e-4, np.nan]],
-)
-
-
-def lines_of(ax, colour, style):
+def lines_of(ax, style, colour=None):
     """Lines that have data."""
-    return [
-        line
-        for line in ax.lines
-        if same_color(line.get_color(), colour) and line.get_linestyle() == style and len(line.get_xdata()) > 1
-    ]
+    drawn = [line for line in ax.lines if line.get_linestyle() == style and len(line.get_xdata()) > 1]
+    return [line for line in drawn if colour is None or same_color(line.get_color(), colour)]
 
 
 def are_apart(*things):
@@ -83,31 +70,20 @@ def are_apart(*things):
 
 
 def is_inside_its_figure(ax):
-    figure = ax.figure
-    figure.canvas.draw()
-    box, whole = ax.get_tightbbox(), figure.bbox
+    ax.figure.canvas.draw()
+    box, whole = ax.get_tightbbox(), ax.figure.bbox
     return box.x0 >= whole.x0 and box.x1 <= whole.x1 and box.y0 >= whole.y0 and box.y1 <= whole.y1
 
 
 # --- Every figure ---------------------------------------------------------------------------------------------------
 
-OF_GROUPS = {
-    "amplification": plotting.amplification,
-    "information": plotting.information,
-    "noise_shares": plotting.noise_shares,
-    "required_noise": plotting.required_noise,
-}
 
-
-@pytest.mark.parametrize("name", OF_GROUPS)
-def test_groups_are_taken_alone_and_in_their_tree_and_drawn_where_it_is_wanted(found, name):
-    draw = OF_GROUPS[name]
-    group = found[name]
+@pytest.mark.parametrize("name", ["amplification", "information", "noise_shares", "required_noise"])
+def test_groups_are_taken_alone_and_in_their_tree(found, name):
+    draw, group = getattr(plotting, name), found[name]
     drawn = [draw(of) for of in (found, group, group.to_dataset())]
     assert len({(ax.get_xlabel(), ax.get_ylabel(), ax.get_ylim(), len(ax.lines)) for ax in drawn}) == 1
     assert is_inside_its_figure(drawn[0])
-    _, ax = plt.subplots()
-    assert draw(found, ax=ax) is ax
 
 
 # --- Amplification --------------------------------------------------------------------------------------------------
@@ -122,7 +98,7 @@ def test_curves_are_the_standard_deviations_thick_where_first_order_holds(found,
         of = grown.sel(reconstruction=method)
         for side, style in (("along", "-"), ("across", "--")):
             expected = dict(zip(np.degrees(of.drive_angle.values), of[f"sd_{side}"].values, strict=True))
-            thin, thick = lines_of(ax, colour, style)
+            thin, thick = lines_of(ax, style, colour)
             assert thin.get_linewidth() < thick.get_linewidth()
             seen = {}
             for line in (thin, thick):
@@ -179,7 +155,7 @@ def test_leverage_is_drawn_by_channel_and_direction(found):
     for sweep, style in ((0, "-"), (1, "--")):
         of = told.isel(sample=told.sweep.values == sweep).sortby("drive_angle")
         for name in told.channel.values:
-            (line,) = lines_of(ax, READING_COLOURS[str(name)], style)
+            (line,) = lines_of(ax, style, READING_COLOURS[str(name)])
             np.testing.assert_array_equal(line.get_xdata(), np.degrees(of.drive_angle.values))
             np.testing.assert_array_equal(line.get_ydata(), of.leverage.sel(channel=name).values)
     moment = float(told.leverage.sel(channel="holding_moment").sum())
@@ -235,10 +211,6 @@ def test_widths_are_drawn_over_noise_and_the_present_cell_is_on_the_line(found):
     assert re.search(r"width .* 95 % .*\[\$L\$\]$", ax.get_ylabel())
     asked_for, as_it_is = labels(ax)
     assert (asked_for, "load cell" in as_it_is) == ("asked for", True)
-
-
-def test_the_upper_axis_has_the_noise_of_the_moment(found):
-    ax = plotting.required_noise(found)
     ax.figure.canvas.draw()
     (above,) = ax.child_axes
     np.testing.assert_allclose(above.get_xlim(), np.array(ax.get_xlim()) * 0.02 / 0.05)
@@ -281,9 +253,7 @@ def test_errors_are_solid_and_first_order_is_dashed(study, method):
     ax = plotting.error_map(study, quantity="along", reconstruction=method)
     of = study.sel(contour="II", reconstruction=method).sortby("noise_factor")
     for style, name in (("-", "rms_along"), ("--", "first_order_along")):
-        drawn = [line for line in ax.lines if line.get_linestyle() == style and len(line.get_xdata()) > 1]
-        assert len(drawn) == 2
-        for line, distance in zip(drawn, (0.4, 0.8), strict=True):
+        for line, distance in zip(lines_of(ax, style), (0.4, 0.8), strict=True):
             assert list(line.get_xdata()) == [0.1, 1.0]
             np.testing.assert_array_equal(line.get_ydata(), of[name].sel(distance=distance).values)
     assert labels(ax) == ["II", "at 0.4 L", "at 0.8 L", "first order"]
@@ -297,9 +267,8 @@ def test_bands_are_dashed_and_posteriors_are_filled(study):
     seen["posterior_touched_width"][0, 0, 1] = 0.003
     ax = plotting.error_map(seen, quantity="touched")
     assert "touched: filled markers" in ax.get_legend().get_title().get_text()
-    filled = [line for line in ax.lines if line.get_linestyle() == "None" and len(line.get_xdata()) > 1]
+    filled, dashed = lines_of(ax, "None"), lines_of(ax, "--")
     np.testing.assert_array_equal(filled[0].get_ydata(), [0.003, np.nan])
-    dashed = [line for line in ax.lines if line.get_linestyle() == "--" and len(line.get_xdata()) > 1]
     expected = study.expected_touched_width.sel(contour="II", distance=0.4).sortby("noise_factor")
     np.testing.assert_array_equal(dashed[0].get_ydata(), expected.values)
     assert same_color(dashed[0].get_markerfacecolor(), "white")
@@ -316,42 +285,32 @@ def test_where_nothing_is_known_the_map_says_so(study):
 # --- Rods -----------------------------------------------------------------------------------------------------------
 
 
-def test_rods_are_coloured_by_width_and_the_best_is_marked():
-    ax = plotting.required_rod(SOME)
+def test_rods_are_coloured_by_width_the_best_is_marked_and_the_refused_are_hatched():
+    ax = plotting.required_rod(rods())
     (mesh,) = ax.collections
-    np.testing.assert_array_equal(np.ma.filled(mesh.get_array(), np.nan), SOME.width.values.T)
+    np.testing.assert_array_equal(np.ma.filled(mesh.get_array(), np.nan), np.transpose(WIDTH))
     (star,) = (line for line in ax.lines if line.get_marker() == "*")
     assert (star.get_xdata()[0], star.get_ydata()[0]) == (0.1, 4e-4)
     assert labels(ax) == ["bent too far", "does not reach", "cannot be swept", "best: 200 µm"]
     assert ax.get_xlabel() == "length of the rod [mm]"
     assert ax.get_ylabel() == "diameter of the rod [µm]"
-    bar = ax.figure.axes[-1]
-    assert re.search(r"width .* 95 % .* gap \[µm\]$", bar.get_ylabel())
+    assert re.search(r"width .* 95 % .* gap \[µm\]$", ax.figure.axes[-1].get_ylabel())
     assert is_inside_its_figure(ax)
-
-
-def test_each_rod_that_is_refused_is_hatched():
-    ax = plotting.required_rod(SOME)
-    found = {}
-    for patch in ax.patches:
-        corners = patch.get_xy()[:4]
-        found[patch.get_hatch()] = tuple(
-            bool(low < value < high)
-            for low, high, value in zip(corners.min(axis=0), corners.max(axis=0), (0.1, 8e-4), strict=True)
-        )
+    hatched = {patch.get_hatch(): patch.get_path().contains_point((0.1, 8e-4)) for patch in ax.patches}
     assert len(ax.patches) == 3
-    assert [all(inside) for inside in found.values()] == [True, False, False]
+    assert list(hatched.values()) == [True, False, False]
 
 
 def test_where_no_rod_is_good_none_is_marked():
-    ax = plotting.required_rod(rods([["bent too far"] * 3] * 2, [[1e-4] * 3] * 2))
+    none = (np.nan, np.nan, np.nan)
+    ax = plotting.required_rod(rods([["bent too far"] * 3] * 2, [[1e-4] * 3] * 2, none))
     assert labels(ax) == ["bent too far"]
-    empty = plotting.required_rod(rods([["does not reach"] * 3] * 2, [[np.nan] * 3] * 2))
+    empty = plotting.required_rod(rods([["does not reach"] * 3] * 2, [[np.nan] * 3] * 2, none))
     assert labels(empty) == ["does not reach"]
     assert not empty.collections
 
 
 def test_one_rod_alone_is_a_cell_about_itself():
-    ax = plotting.required_rod(SOME.isel(length=[0], diameter=[1]))
+    ax = plotting.required_rod(rods().isel(length=[0], diameter=[1]))
     assert ax.get_xlim()[0] < 0.1 < ax.get_xlim()[1]
     assert ax.get_ylim()[0] < 4e-4 < ax.get_ylim()[1]

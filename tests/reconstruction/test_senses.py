@@ -63,17 +63,6 @@ def test_a_straight_rod_that_turns_one_way_has_one_slope():
     np.testing.assert_array_equal(contacts.greatest_slope_angle[loaded], contacts.slope_angle[loaded])
 
 
-def test_a_rod_curved_toward_the_object_may_slide_outward_first():
-    rig = Rig(rod=tb.Rod(rest_curvature=0.3), unknown={"friction": 0.3})
-    record = tb.scan(PARABOLA, rig, drive=tb.Rotation(direction="forward", drive_step=0.05)).record
-    contacts = tb.reconstruct(record, rig)
-    loaded = np.hypot(record.force_x, record.force_y).values > 1e-3
-    truth = record.truth_slope_angle.values[loaded]
-    low, high = (contacts[f"{end}_slope_angle"].values[loaded] for end in ("least", "greatest"))
-    assert np.all((low - ROUNDING < truth) & (truth < high + ROUNDING))
-    assert np.all(high > low)
-
-
 @pytest.mark.parametrize("friction", [0.1, 0.5])
 @pytest.mark.parametrize(("contour", "drive"), SWEPT.values(), ids=SWEPT)
 def test_contacts_under_noise_hold_whether_the_rod_slides_or_sticks(contour, drive, friction):

@@ -19,33 +19,30 @@ SHORT = tb.Translation(base=(0.6, 0.0), heading=np.pi, drive_angle=1.2, travel=1
 ROD = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
 
 
-def _stage(path, record, head="", columns=("base_x", "base_y", "holding_moment", "force_x", "force_y")):
-    rows = zip(*(record[name].values.tolist() for name in columns), strict=True)
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
-    path.write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
-    return path
+@pytest.fixture
+def staged(tmp_path):
+    """Write the file of a stage, with or without a column of angles, and read it."""
+
+    def read(record, *, head="", angles=True, rod=None, **columns):
+        names = ["base_x", "base_y", *(["drive_angle"] if angles else []), "holding_moment", "force_x", "force_y"]
+        rows = zip(*(record[name].values.tolist() for name in names), strict=True)
+        lines = [",".join(names), *(",".join(map(repr, row)) for row in rows)]
+        (tmp_path / "stage.csv").write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
+        return tb.read_record(tmp_path / "stage.csv", tb.Rig(rod=rod, file={**columns, "split_sweeps": True}))
+
+    return read
 
 
 @pytest.mark.parametrize(
     ("head", "columns"),
     [("# drive_angle: 68.75 [deg]\n", {}), ("# drive_angle: 1.2\n", {}), ("", {"drive_angle": "68.75[deg]"})],
 )
-def test_a_clamped_rod_states_its_angle_once(tmp_path, head, columns):
-    record = tb.scan(CIRCLE, drive=THERE).record
-    read = tb.read_record(_stage(tmp_path / "stage.csv", record, head), tb.Rig(file={**columns, "split_sweeps": True}))
+def test_a_clamped_rod_states_its_angle_once(staged, head, columns):
+    read = staged(tb.scan(CIRCLE, drive=THERE).record, head=head, angles=False, **columns)
     np.testing.assert_allclose(read.drive_angle, 1.2, atol=1e-4)
     assert carried_sweeps(read) == (0,)
     assert set(read.direction.values) == {"forward"}
     assert "drive_angle" not in read.attrs
-
-
-def test_a_column_of_angles_precedes_an_angle_in_the_header(tmp_path):
-    record = tb.scan(CIRCLE, drive=THERE).record
-    columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
-    path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 0.3\n", columns)
-    np.testing.assert_array_equal(
-        tb.read_record(path, tb.Rig(file={"split_sweeps": True})).drive_angle, record.drive_angle
-    )
 
 
 @pytest.mark.parametrize(
@@ -57,12 +54,22 @@ def test_a_column_of_angles_precedes_an_angle_in_the_header(tmp_path):
         [THERE, tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.2, 1.6)],
     ],
 )
-def test_sweeps_and_directions_follow_from_the_motion(tmp_path, drive):
+def test_sweeps_and_directions_follow_from_the_motion(staged, drive):
+    """A column of angles precedes an angle in the header."""
     record = tb.scan(CIRCLE, drive=drive).record
-    columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
-    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), tb.Rig(file={"split_sweeps": True}))
+    read = staged(record, head="# drive_angle: 0.3\n")
+    np.testing.assert_array_equal(read.drive_angle, record.drive_angle)
     np.testing.assert_array_equal(read.direction, record.direction)
     assert len(set(read.sweep.values.tolist())) == len(drive)
+
+
+def test_lengths_of_a_stage_are_in_metres(staged):
+    drive = tb.Translation((0.08, 0.0), np.pi, 1.2, 0.16)
+    record = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rig=Rig(rod=ROD)).record
+    with pytest.warns(tb.errors.RecordWarning, match="for base_x, .* m, N m, N and N"):
+        read = staged(record, head="# drive_angle: 68.75 [deg]\n", angles=False, rod=ROD)
+    assert travels_of(read)[-1] == pytest.approx(0.16)
+    assert set(read.direction.values) == {"forward"}
 
 
 @pytest.mark.parametrize(
@@ -76,13 +83,12 @@ def test_sweeps_and_directions_follow_from_the_motion(tmp_path, drive):
     ids=["beside", "from-its-end", "from-its-begin", "a-motion-between"],
 )
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
-def test_a_record_of_both_kinds_is_parted_where_the_base_begins_or_stops_to_move(tmp_path, drive, noise):
+def test_a_record_of_both_kinds_is_parted_where_the_base_begins_or_stops_to_move(staged, drive, noise):
     """Also with noise of the encoder, and where a pivot is where the base begins or ends to move."""
     record = tb.scan(CIRCLE, drive=drive).record
     angle = record.drive_angle.values + np.random.default_rng(1).normal(0.0, noise, record.sizes["sample"])
     record = record.assign(drive_angle=("sample", angle, record.drive_angle.attrs))
-    columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
-    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), tb.Rig(file={"split_sweeps": True}))
+    read = staged(record)
     ends, found = (np.flatnonzero(np.diff(one.sweep)) for one in (record, read))
     assert found.size == ends.size
     assert np.abs(found - ends).max() <= 1  # a sample at which the drive turns back belongs to either sweep
@@ -108,8 +114,8 @@ def test_travels_are_ways_where_the_base_is_carried():
 def test_unloaded_stretches_end_at_travels():
     scan = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE])
     found = zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, rng=1))
-    for number, event in ((0, "snap_off"), (2, "snap_off")):
-        before, after = found[f"{event}_travel"].sel(sweep=number).values
+    for number in (0, 2):
+        before, after = found["snap_off_travel"].sel(sweep=number).values
         assert before <= scan.sweeps[number].snap_off.travel <= after
     turned = tb.scan(CIRCLE).record
     assert "onset_travel" not in zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(turned, rng=1))
@@ -125,13 +131,3 @@ def test_an_inspection_reports_travels_and_finds_lost_samples():
     assert not found.samples.uneven_step.values.any()
     lost = tb.inspect_record(measured.isel(sample=np.delete(np.arange(161), [30, 31])))
     assert np.flatnonzero(lost.samples.uneven_step.values).tolist() == [30]
-
-
-def test_lengths_of_a_stage_are_in_metres(tmp_path):
-    drive = tb.Translation((0.08, 0.0), np.pi, 1.2, 0.16)
-    record = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rig=Rig(rod=ROD)).record
-    path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 68.75 [deg]\n")
-    with pytest.warns(tb.errors.RecordWarning, match="for base_x, .* m, N m, N and N"):
-        read = tb.read_record(path, tb.Rig(rod=ROD, file={"split_sweeps": True}))
-    assert travels_of(read)[-1] == pytest.approx(0.16)
-    assert set(read.direction.values) == {"forward"}

@@ -6,7 +6,7 @@ import pytest
 from helpers import commands
 from helpers.record_tables import WIRE
 from helpers.refusals import refused
-from tactile_bayes.errors import RecordError, RecordWarning
+from tactile_bayes.errors import RecordError
 from tactile_bayes.record import record_hash
 from tactile_bayes.rig import Rig, read_record
 
@@ -50,12 +50,6 @@ def test_commas_in_names_part_no_columns_where_semicolons_do(tmp_path, plain):
         read(tmp_path, ";".join(columns.values()), *ROWS, columns={})
 
 
-def test_tabs_behind_commas_are_blanks(tmp_path):
-    lines = ["sweep,\tdirection,\tdrive_angle,\tholding_moment,\tforce_x,\tforce_y", "3,\tforward,\t1.2,\t0.1,\t1,\t2"]
-    with pytest.warns(RecordWarning, match="for drive_angle, .* rad, N m, N and N"):
-        assert read_record_of(tmp_path, *lines)["force_y"].values.tolist() == [2.0]
-
-
 @pytest.mark.parametrize("names", ["Messung 4", "Messung 1,5 mm", "Messung;4"])
 def test_lines_before_the_names_are_refused_whatever_signs_are_in_them(tmp_path, names):
     with refused(RecordError, "line 1", "(Messung"):
@@ -75,25 +69,26 @@ def test_a_row_of_units_is_what_units_in_names_are(tmp_path, plain, units, end):
     assert read(tmp_path, in_names, *ROWS).equals(plain)
 
 
-def test_a_unit_that_is_not_known_is_kept_of_a_column_that_is_not_measured(tmp_path, plain):
+def test_units_and_samples_are_told_apart_whatever_is_in_them(tmp_path, plain):
+    """A unit that is not known is kept of a column that is not measured; 1 is a unit too, and N may be a remark."""
     record = read(tmp_path, NAMES + ";T", "°;mN m;mN;mN;°C", *(row + ";21,5" for row in ROWS))
     assert record["T"].values.tolist() == [21.5] * len(ROWS)
     assert record["T"].attrs["units"] == "°C"
     assert record.drop_vars("T").equals(plain)
+    record = read(tmp_path, NAMES + ";note", "1;1;1;1;N", "1,5;1;1;1;N", rod=None)
+    assert record.sizes["sample"] == 2
+    assert record["note"].values.tolist() == ["N", "N"]
 
 
 def test_a_row_of_units_also_tells_those_of_names_that_a_record_has(tmp_path):
-    lines = ["sweep,direction,drive_angle,holding_moment,force_x,force_y,time", "-,,°,mN m,mN,mN,s"]
-    record = read_record_of(tmp_path, *lines, "3,forward,60,0.1,1,2,0.5")
+    """Tabs behind commas are blanks."""
+    names = "sweep,\tdirection,\tdrive_angle,\tholding_moment,\tforce_x,\tforce_y,\ttime"
+    (tmp_path / "rig.csv").write_text(f"{names}\n-,,°,mN m,mN,\tmN,s\n3,forward,\t60,0.1,1,2,0.5\n", encoding="utf-8")
+    record = read_record(tmp_path / "rig.csv", Rig(rod=WIRE))
     assert record["force_y"].values.tolist() == [0.002]
     assert record["force_y"].attrs["units"] == "N"
     np.testing.assert_allclose(record["drive_angle"], np.radians(60.0), rtol=1e-15)
     assert (record["sweep"].item(), record["time"].attrs["units"]) == (3, "s")
-
-
-def read_record_of(tmp_path, *lines):
-    (tmp_path / "rig.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return read_record(tmp_path / "rig.csv", Rig(rod=WIRE))
 
 
 @pytest.mark.parametrize(
@@ -108,19 +103,14 @@ def read_record_of(tmp_path, *lines):
         ([NAMES, "1;1;-;-", *ROWS], ["line 2, column 'Fx'", "'-'"]),
         ([NAMES + ";", "°;mN m;mN;mN;s", ROWS[0] + ";"], ["line 1", "column 5"]),
         (["# column Fx: number [N]", NAMES, "°;mN m;mN;mN", *ROWS], ["line 3", "'Fx'", "[mN]", "[N] in line 1"]),
+        ([NAMES + ";note", *[f"{ROWS[0]};a"] * 5000, "60,0;x;1;2;größer"], ["line 5002, column 'Mz'", "'x'"]),
         (["Fx;4", NAMES.replace("Fx", "Kraft"), "°;mN m;mN;mN", *ROWS], ["no column 'Winkel'"]),
     ],
 )
-def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, named):
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, named, encoding):
     with refused(RecordError, *named):
-        read(tmp_path, *lines)
-
-
-def test_a_first_sample_of_ones_is_no_row_of_units(tmp_path):
-    """1 is a unit too, and N may be a remark."""
-    record = read(tmp_path, NAMES + ";note", "1;1;1;1;N", "1,5;1;1;1;N", rod=None)
-    assert record.sizes["sample"] == 2
-    assert record["note"].values.tolist() == ["N", "N"]
+        read(tmp_path, *lines, encoding=encoding)
 
 
 # --- Windows-1252 ---------------------------------------------------------------------------------------------------
@@ -135,12 +125,6 @@ def test_windows_1252_is_read_as_such(tmp_path, plain, end):
     assert record["Wärme"].values.tolist() == [1, 1]
     same = read(tmp_path, NAMES, "°;mN m;mN;mN", *ROWS, encoding="cp1252")
     assert record_hash(same) == record_hash(plain)
-
-
-def test_windows_1252_far_below_keeps_the_lines_of_errors(tmp_path):
-    lines = [NAMES + ";note", *[f"{ROWS[0]};a"] * 5000, "60,0;x;1;2;größer"]
-    with refused(RecordError, "line 5002, column 'Mz'", "'x'"):
-        read(tmp_path, *lines, encoding="cp1252")
 
 
 @pytest.mark.parametrize(

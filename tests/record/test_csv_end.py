@@ -22,24 +22,19 @@ SHORTEST = ["0.5", "0.25", "1", "0.125", "1.5", "0.0625", "2", "0.5", "0.75", "1
 
 
 @pytest.mark.parametrize(
-    ("cells", "last"),
-    [(EXPONENTS, "3.5600"), (EXPONENTS, "3.56e-0"), (DECIMALS, "1.4"), (DECIMALS, "1"), (SHORTEST, "75.125")],
+    ("cells", "last", "is_cut"),
+    [
+        *((EXPONENTS, "3.5600", True), (EXPONENTS, "3.56e-0", True), (EXPONENTS, "9.5600e-02", False)),
+        *((DECIMALS, "1.4", True), (DECIMALS, "1", True), (DECIMALS, "140.0000", False)),
+        *((SHORTEST, "75.125", True), (SHORTEST, "0.625", False), (["1", "2"], "3.5", False)),
+    ],
 )
-def test_a_row_whose_last_number_is_cut_is_left_out(tmp_path, cells, last):
+def test_a_row_is_left_out_if_its_last_number_is_cut_and_kept_if_files_end_so_by_habit(tmp_path, cells, last, is_cut):
     path = written(tmp_path / "record.csv", cells, last)
-    with pytest.warns(RecordWarning, match=rf"line 16, .* '{last}'.* left out"):
+    match = rf"line 16, .* '{last}'.* left out" if is_cut else r"no end: (?!.*left out)"
+    with pytest.warns(RecordWarning, match=match):
         record = read_record(path)
-    assert record.force_y.values.tolist() == [float(cell) for cell in cells]
-
-
-@pytest.mark.parametrize(
-    ("cells", "last"), [(EXPONENTS, "9.5600e-02"), (DECIMALS, "140.0000"), (SHORTEST, "0.625"), (["1", "2"], "3.5")]
-)
-def test_a_file_without_a_final_line_end_by_habit_is_read_whole(tmp_path, cells, last):
-    path = written(tmp_path / "record.csv", cells, last)
-    with pytest.warns(RecordWarning, match=r"no end: (?!.*left out)"):
-        record = read_record(path)
-    assert record.force_y.values.tolist() == [float(cell) for cell in [*cells, last]]
+    assert record.force_y.values.tolist() == [float(cell) for cell in (cells if is_cut else [*cells, last])]
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\n\n", "\n,,,,,"])

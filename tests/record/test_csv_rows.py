@@ -101,15 +101,6 @@ def test_digits_become_the_nearest_double(tmp_path, decimal, numbers):
     assert values.tobytes() == np.array([float(text) for text in texts]).tobytes()
 
 
-def test_a_column_that_turns_out_to_be_text_is_read_again_from_the_beginning(tmp_path, monkeypatch):
-    monkeypatch.setattr(csv_rows, "_CHUNK", 200)
-    path = tmp_path / "record.csv"
-    notes = ["02", "1.50", *["7"] * 100, "no", "8"]
-    rows = [f"0,forward,{1 + k / 1000},0.1,0.1,0.1,{note}" for k, note in enumerate(notes)]
-    path.write_text("\n".join(["sweep,direction,drive_angle,holding_moment,force_x,force_y,note", *rows, ""]))
-    assert read_record(path)["note"].values.tolist() == notes
-
-
 @pytest.mark.parametrize("where", [0, 50, 100])
 def test_a_long_remark_among_many_short_ones(tmp_path, monkeypatch, where):
     monkeypatch.setattr(csv_rows, "_CHUNK", 200)
@@ -164,9 +155,7 @@ def test_a_file_is_read_in_less_memory_than_four_times_its_size(tmp_path):
             file.writelines(f"{sweep},forward,{line},\n" for line in lines)
         file.write(f"{sweeps - 1},forward,3,0,0,0,{'a long remark ' * 1000}\n")
     first = tmp_path / "first.csv"
-    first.write_text(
-        "sweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,0,0,0\n", encoding="utf-8"
-    )
+    first.write_text("sweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,0,0,0\n")
     command = [sys.executable, "-c", READING, path, first]
     done = subprocess.run(command, cwd=TESTS, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr

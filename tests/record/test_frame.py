@@ -14,7 +14,6 @@ from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import (
-    CHANNELS,
     FRAMES,
     frame_of,
     in_frame,
@@ -41,8 +40,12 @@ def scanned():
 
 def test_a_force_along_the_rod_is_axial_and_one_to_its_left_is_transversal():
     along = make_record(columns(force_x=2.0 * np.cos(ANGLES), force_y=2.0 * np.sin(ANGLES)))
-    np.testing.assert_allclose(in_frame(along, "turning")["force_x"], 2.0, rtol=4 * EPS)
-    np.testing.assert_allclose(in_frame(along, "turning")["force_y"], 0.0, atol=4 * EPS)
+    turning = in_frame(along, "turning")
+    assert turning.attrs == {**along.attrs, "load_cell_frame": "turning"}
+    names = [turning[name].attrs["long_name"] for name in ("force_x", "force_y")]
+    assert names == ["axial support reaction", "transversal support reaction"]
+    np.testing.assert_allclose(turning["force_x"], 2.0, rtol=4 * EPS)
+    np.testing.assert_allclose(turning["force_y"], 0.0, atol=4 * EPS)
     across = make_record(columns(force_x=-2.0 * np.sin(ANGLES), force_y=2.0 * np.cos(ANGLES)))
     np.testing.assert_allclose(in_frame(across, "turning")["force_x"], 0.0, atol=4 * EPS)
     np.testing.assert_allclose(in_frame(across, "turning")["force_y"], 2.0, rtol=4 * EPS)
@@ -54,18 +57,21 @@ def test_there_and_back_is_the_same_record(forces, turn, frame):
     names = ("force_x", "force_y", "truth_force_x", "truth_force_y")
     table = columns(**dict(zip(names, forces, strict=True)), drive_angle=ANGLES + turn)
     record = make_record(table, Rig(load_cell=LoadCell(frame=frame)))
+    before = record.copy(deep=True)
     other = in_frame(record, next(name for name in FRAMES if name != frame))
+    assert record.identical(before)
     back = in_frame(other, frame)
     assert back.attrs == record.attrs
     for name in record:
         assert back[name].attrs == record[name].attrs
         if name not in names:
-            assert back[name].identical(record[name])
+            assert record[name].identical(other[name])
+            assert record[name].identical(back[name])
     for pair in (names[:2], names[2:]):
-        before = np.array([record[name].values for name in pair])
-        size = np.hypot(*before)
+        forces = np.array([record[name].values for name in pair])
+        size = np.hypot(*forces)
         np.testing.assert_allclose(np.hypot(*(other[name].values for name in pair)), size, rtol=8 * EPS, atol=1e-300)
-        assert np.all(np.abs(np.array([back[name].values for name in pair]) - before) <= 8 * EPS * size + 1e-300)
+        assert np.all(np.abs(np.array([back[name].values for name in pair]) - forces) <= 8 * EPS * size + 1e-300)
 
 
 @pytest.mark.parametrize(
@@ -89,23 +95,6 @@ def test_the_axial_force_tells_the_phase_in_both_directions(contour, base, rod):
         np.testing.assert_allclose(excess[swept & (phase == "tangential")], 0.0, atol=1e-11 * largest)
         assert (excess[swept & (phase == "tip")] > 0.0).all()
         assert not record["force_x"].values[swept & (phase == "none")].any()
-
-
-def test_only_forces_change(scanned):
-    before = scanned.copy(deep=True)
-    record = in_frame(scanned, "turning")
-    assert scanned.identical(before)
-    for name in set(scanned) - {"force_x", "force_y"}:
-        assert record[name].identical(scanned[name])
-    assert record.attrs == {**scanned.attrs, "load_cell_frame": "turning"}
-    assert record["force_x"].attrs == {"units": "1", "long_name": "axial support reaction"}
-    assert record["force_y"].attrs == {"units": "1", "long_name": "transversal support reaction"}
-
-
-def test_a_record_in_the_frame_already_is_returned(scanned):
-    turning = in_frame(scanned, "turning")
-    assert in_frame(scanned, "fixed") is scanned
-    assert in_frame(turning, "turning") is turning
 
 
 def test_truth_turns_by_the_true_angle_where_it_is_known():
@@ -137,19 +126,6 @@ def test_units_and_frame_convert_in_any_order():
     assert one.attrs["load_cell_frame"] == "turning"
 
 
-# --- Missing channels -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("frame", FRAMES)
-@pytest.mark.parametrize(("name", "other"), [("force_x", "force_y"), ("force_y", "force_x")])
-def test_one_force_alone_is_refused(name, other, frame):
-    wanted = next(other_frame for other_frame in FRAMES if other_frame != frame)
-    record = make_record(columns(**{name: None}), Rig(load_cell=LoadCell(frame=frame), file={"missing": (name,)}))
-    assert in_frame(record, frame) is record
-    with refused(RecordError, f"{name} was not", f"{wanted} frame", f"so {other}"):
-        in_frame(record, wanted)
-
-
 def test_without_any_force_there_is_nothing_to_lose():
     record = make_record(columns(force_x=None, force_y=None), Rig(file={"missing": ("force_x", "force_y")}))
     turning = in_frame(record, "turning")
@@ -157,36 +133,54 @@ def test_without_any_force_there_is_nothing_to_lose():
     xr.testing.assert_equal(turning, record)
 
 
-def test_half_a_truth_is_refused():
-    with refused(RecordError, "sample 0", "a truth_force_y", "no truth_force_x", "turning"):
-        in_frame(make_record(columns(truth_force_y=np.ones(6))), "turning")
-    gap = np.where(np.arange(6) == 2, np.nan, 0.5)
-    with refused(RecordError, "sample 2", "a truth_force_x", "no truth_force_y"):
-        in_frame(make_record(columns(truth_force_x=np.ones(6), truth_force_y=gap)), "turning")
+GAP = np.where(np.arange(6) == 2, np.nan, 0.5)
+HUGE = np.where(np.arange(6) == 5, 1.7e308, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "frame", "named"),
+    [
+        *(
+            (columns(**{name: np.full(6, np.nan)}), frame, [f"{name} was not", f"{wanted} frame", f"so {other}"])
+            for name, other in (("force_x", "force_y"), ("force_y", "force_x"))
+            for frame, wanted in (FRAMES, FRAMES[::-1])
+        ),
+        (columns(truth_force_y=np.ones(6)), "fixed", ["sample 0", "a truth_force_y", "no truth_force_x", "turning"]),
+        (columns(truth_force_x=np.ones(6), truth_force_y=GAP), "fixed", ["sample 2", "a truth_force_x"]),
+        (
+            columns(force_x=HUGE, force_y=HUGE, drive_angle=ANGLES - 1.0),
+            "fixed",
+            ["sample 5, column 'force_x'", "inf"],
+        ),
+    ],
+)
+def test_what_cannot_be_turned_is_refused_and_returned_in_its_own_frame(table, frame, named):
+    record = make_record(table, Rig(load_cell=LoadCell(frame=frame)))
+    assert in_frame(record, frame) is record
+    with refused(RecordError, *named):
+        in_frame(record, next(other for other in FRAMES if other != frame))
 
 
 # --- The attribute ----------------------------------------------------------------------------------------------
 
 
-def test_a_record_that_states_no_frame_is_fixed():
-    assert frame_of(make_record(columns())) == "fixed"
-    assert "load_cell_frame" not in make_record(columns()).attrs
-
-
-@pytest.mark.parametrize("way", ["keyword", "attribute", "later"])
-def test_a_record_may_be_said_to_turn(way):
-    if way == "keyword":
-        record = make_record(columns(), Rig(load_cell=LoadCell(frame="turning")))
-    elif way == "attribute":
-        record = make_record(columns(), attrs={"load_cell_frame": "turning"})
-    else:
-        record = validate(make_record(columns()).assign_attrs(load_cell_frame="turning"))
-    assert frame_of(record) == "turning"
-    assert record["force_x"].attrs["long_name"] == "axial support reaction"
-    np.testing.assert_array_equal(record["force_x"], columns()["force_x"])
-
-
-def test_words_of_ones_own_are_kept():
+def test_a_record_may_be_said_to_turn(tmp_path):
+    """To the load cell, as an attribute, later, or of a file that states no frame; a name of one's own is kept."""
+    plain, cell = make_record(columns()), Rig(load_cell=LoadCell(frame="turning"))
+    assert frame_of(plain) == "fixed"
+    assert "load_cell_frame" not in plain.attrs
+    write_record(plain, tmp_path / "plain.csv")
+    assert frame_of(read_record(tmp_path / "plain.csv")) == "fixed"
+    for record in (
+        make_record(columns(), cell),
+        make_record(columns(), attrs={"load_cell_frame": "turning"}),
+        make_record(columns(), cell, attrs={"load_cell_frame": "turning"}),
+        validate(plain.assign_attrs(load_cell_frame="turning")),
+        read_record(tmp_path / "plain.csv", cell),
+    ):
+        assert frame_of(record) == "turning"
+        assert record["force_x"].attrs["long_name"] == "axial support reaction"
+        np.testing.assert_array_equal(record["force_x"], columns()["force_x"])
     gauge = xr.DataArray(np.ones(6), dims="sample", attrs={"long_name": "strain gauge 1"})
     record = in_frame(make_record(columns(force_x=gauge)), "turning")
     assert record["force_x"].attrs["long_name"] == "strain gauge 1"
@@ -194,42 +188,20 @@ def test_words_of_ones_own_are_kept():
 
 @pytest.mark.parametrize("frame", ["world", "Turning", "", 1, 1.0])
 def test_a_frame_that_is_none_is_refused(frame):
-    named = ("'load_cell_frame'", repr(frame), "'fixed'", "'turning'")
     record = make_record(columns()).assign_attrs(load_cell_frame=frame)
-    for use in (validate, frame_of, record_hash, lambda record: in_frame(record, "fixed")):
-        with refused(RecordError, *named):
+    for use in (validate, frame_of, record_hash, lambda record: in_frame(record, "fixed"),
+                lambda record: make_record(columns(), attrs=record.attrs)):  # fmt: skip
+        with refused(RecordError, "'load_cell_frame'", repr(frame), "'fixed'", "'turning'"):
             use(record)
-    with refused(RecordError, *named):
-        make_record(columns(), attrs={"load_cell_frame": frame})
 
 
-def test_a_frame_to_convert_to_that_is_none_is_refused(scanned):
-    with refused(ParameterError, frame="world"):
-        in_frame(scanned, "world")
-
-
-def test_what_is_no_record_is_refused():
-    with refused(RecordError, "xarray.Dataset", "dict"):
-        in_frame({}, "turning")
-
-
-def test_two_statements_that_differ_are_refused():
+def test_frames_that_contradict_or_do_not_exist_are_refused(scanned):
     with refused(RecordError, "load_cell_frame 'fixed'", "'turning'"):
         make_record(columns(), Rig(load_cell=LoadCell(frame="turning")), attrs={"load_cell_frame": "fixed"})
-    twice = make_record(columns(), Rig(load_cell=LoadCell(frame="turning")), attrs={"load_cell_frame": "turning"})
-    assert frame_of(twice) == "turning"
-
-
-def test_a_force_that_overflows_is_refused():
-    huge = np.where(np.arange(6) == 5, 1.7e308, 0.0)
-    with refused(RecordError, "sample 5, column 'force_x'", "inf"):
-        in_frame(make_record(columns(force_x=huge, force_y=huge, drive_angle=ANGLES - 1.0)), "turning")
-
-
-def test_the_hash_sees_the_frame():
-    record = make_record(columns())
-    assert record_hash(record.assign_attrs(load_cell_frame="fixed")) == record_hash(record)
-    assert record_hash(record.assign_attrs(load_cell_frame="turning")) != record_hash(record)
+    with refused(ParameterError, frame="world"):
+        in_frame(scanned, "world")
+    with refused(RecordError, "xarray.Dataset", "dict"):
+        in_frame({}, "turning")
 
 
 # --- Files ------------------------------------------------------------------------------------------------------
@@ -244,12 +216,3 @@ def test_a_csv_file_states_the_frame_in_its_header(tmp_path):
     path.write_text("\n".join(lines).replace(": turning", ": spinning") + "\n", encoding="utf-8")
     with refused(RecordError, path, "'load_cell_frame'", "'spinning'", "'fixed'"):
         read_record(path)
-
-
-def test_a_file_that_states_no_frame_may_be_told_it(tmp_path):
-    path = tmp_path / "plain.csv"
-    path.write_text(f"sweep,direction,drive_angle,{','.join(CHANNELS)}\n0,forward,1.2,0.5,0.1,0.2\n", encoding="utf-8")
-    assert frame_of(read_record(path)) == "fixed"
-    record = read_record(path, Rig(load_cell=LoadCell(frame="turning")))
-    assert frame_of(record) == "turning"
-    assert record["force_x"].attrs["long_name"] == "axial support reaction"

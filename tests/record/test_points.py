@@ -10,12 +10,6 @@ from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import read_points
 
-
-def arc(radius, *, ends, points):
-    angle = np.linspace(*ends, points)
-    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
-
-
 POINTS = np.array([[-0.1, 0.12], [0.0, 0.1], [0.1, 0.13]])
 
 
@@ -78,7 +72,8 @@ def test_curves_of_a_drawing_are_polylines_in_its_unit(tmp_path, unit, scale, kn
     space.add_lwpolyline(scale * POINTS)
     space.add_arc((0.0, 0.0), 0.1 * scale, 180.0, 360.0)
     space.add_lwpolyline([(-0.1 * scale, 0.0, 1.0), (0.1 * scale, 0.0, 0.0)], format="xyb")
-    space.add_spline(scale * arc(0.1, ends=(-2.0, -1.0), points=41))
+    angle = np.linspace(-2.0, -1.0, 41)
+    space.add_spline(0.1 * scale * np.column_stack([np.cos(angle), np.sin(angle)]))
     space.add_circle((0.0, 0.0), 0.1 * scale)
     space.add_text("part")
     space.add_line((0.0, 0.0), (1.0, 1.0), {"layer": "hidden"})

@@ -9,8 +9,6 @@ from helpers.record_tables import WIRE
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record.cell import number_in
-from tactile_bayes.record.quantity import unit_of
-from tactile_bayes.record.spelling import is_misspelling, look_alikes, plain, visible
 from tactile_bayes.rig import GrowingRecord, Rig, read_record
 
 COLUMNS = {"holding_moment": "Mz[N mm]", "force_x": "Fx[mN]", "force_y": "Fy[mN]"}
@@ -35,23 +33,6 @@ def test_numbers(text, number):
     assert number_in(text) == number
 
 
-@pytest.mark.parametrize(
-    ("text", "same"),
-    [
-        ("\N{MASCULINE ORDINAL INDICATOR}", "deg"),
-        ("\N{RING ABOVE}", "°"),
-        ("\N{MICRO SIGN}N", "\N{GREEK SMALL LETTER MU}N"),
-        ("N\N{MULTIPLICATION SIGN}m", "N m"),
-        ("N\N{DOT OPERATOR}mm", "N mm"),
-        ("m\N{FULLWIDTH LATIN CAPITAL LETTER N}", "mN"),
-        ("\N{ZERO WIDTH NO-BREAK SPACE}mN", "mN"),
-        ("N\N{NARROW NO-BREAK SPACE}m", "N m"),
-    ],
-)
-def test_units(text, same):
-    assert unit_of(text) == unit_of(same) is not None
-
-
 @pytest.mark.parametrize("minus", ["\N{MINUS SIGN}", "\N{EN DASH}", "\N{FULLWIDTH HYPHEN-MINUS}"])
 def test_origins_of_columns(tmp_path, minus):
     path = tmp_path / "rig.csv"
@@ -67,15 +48,6 @@ def test_what_cannot_be_read_is_named(tmp_path):
     path.write_text("Angle,Mz,Fx,Fy\n30,1,1\N{THIN SPACE}2,3\n", encoding="utf-8")
     with refused(RecordError, "line 2, column 'Fx'", "U+2009 THIN SPACE"):
         read_record(path, Rig(rod=WIRE, file={**COLUMNS, "drive_angle": "Angle[deg]", "split_sweeps": True}))
-    assert "U+200B ZERO WIDTH SPACE" in look_alikes("\N{ZERO WIDTH SPACE}")
-    assert not look_alikes("µ é ß - °")
-
-
-def test_plain_text_stays_as_it_is():
-    assert plain("90-Angle[°] é") == "90-Angle[°] é"
-    assert visible("\N{MINUS SIGN}a\N{THIN SPACE}b\N{WORD JOINER}") == "\N{MINUS SIGN}a b"
-    assert is_misspelling("frietion", "friction")
-    assert not is_misspelling("fiction_", "friction_noise")
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device"])

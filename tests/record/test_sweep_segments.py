@@ -24,21 +24,30 @@ def split(angle, **columns):
 UP, DOWN = np.linspace(1.0, 2.0, 101), np.linspace(2.0, 1.0, 101)
 
 
+FULL = [0.0, 2.0, 4.0, 6.1]
+
+
 @pytest.mark.parametrize(
-    ("parts", "starts", "directions"),
+    ("parts", "base", "starts", "directions"),
     [
-        ([UP], [0], "f"),
-        ([DOWN], [0], "b"),
-        ([UP, DOWN], [0, 101], "fb"),
-        ([DOWN, UP[1:], DOWN[1:]], [0, 101, 201], "bfb"),
-        ([UP, UP, UP], [0, 101, 202], "fff"),  # the drive goes back between samples
-        ([DOWN, DOWN], [0, 101], "bb"),
-        ([UP, np.full(40, 2.0), DOWN], [0, 101], "fb"),  # it rests: which sweep that belongs to does not matter
-        ([UP[:2], DOWN[:0]], [0], "f"),
+        ([UP], None, [0], "f"),
+        ([DOWN], None, [0], "b"),
+        ([UP, DOWN], None, [0, 101], "fb"),
+        ([DOWN, UP[1:], DOWN[1:]], None, [0, 101, 201], "bfb"),
+        ([UP, UP, UP], None, [0, 101, 202], "fff"),  # the drive goes back between samples
+        ([DOWN, DOWN], None, [0, 101], "bb"),
+        ([UP, np.full(40, 2.0), DOWN], None, [0, 101], "fb"),  # it rests: in which sweep does not matter
+        ([UP[:2], DOWN[:0]], None, [0], "f"),
+        ([range(6), range(6)], None, [0, 6], "ff"),  # a reset by less than a turn
+        # A pivot that moves begins a sweep, and may have its angle reset by a turn.
+        ([UP, DOWN[1:]], np.repeat([0.0, 0.5], [101, 100]), [0, 101], "fb"),
+        ([UP], np.repeat([0.0, 0.5], [50, 51]), [0, 50], "ff"),
+        ([FULL, FULL], np.repeat([0.0, 0.5], 4), [0, 4], "ff"),
     ],
 )
-def test_segments_without_noise(parts, starts, directions):
-    assert split(np.concatenate(parts)) == (starts, directions)
+def test_segments_without_noise(parts, base, starts, directions):
+    for columns in [{}] if base is None else [{"base_x": (base, {})}, {"base_y": (base, {})}]:
+        assert split(np.concatenate(parts), **columns) == (starts, directions)
 
 
 @given(st.integers(0, 2**32), st.floats(0.0, 0.02), st.integers(1, 7), st.booleans())
@@ -68,37 +77,17 @@ def test_turning_points_are_those_of_the_definition(angle, least):
     assert turning_points(np.array(angle, float), least) == expected
 
 
-def test_a_pivot_that_moves_begins_a_sweep():
-    base = np.repeat([0.0, 0.5], [101, 100])
-    assert split(np.concatenate([UP, DOWN[1:]]), base_x=(base, {})) == ([0, 101], "fb")
-    base = np.repeat([0.0, 0.5], [50, 51])
-    assert split(UP, base_y=(base, {})) == ([0, 50], "ff")
-
-
-def test_a_reset_by_less_than_a_turn_begins_a_sweep():
-    assert split([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]) == ([0, 6], "ff")
-
-
-def test_a_pivot_that_moves_may_have_its_angle_reset_by_a_turn():
-    base = np.repeat([0.0, 0.5], 4)
-    assert split([0.0, 2.0, 4.0, 6.1, 0.0, 2.0, 4.0, 6.1], base_x=(base, {})) == ([0, 4], "ff")
-
-
 def test_a_sweep_of_one_sample_is_refused():
     with refused(RecordError, "one sample, sample 2", "no direction"):
         split([1.0, 1.1, 1.0], base_x=(np.array([0.0, 0.0, 1.0]), {}))
-
-
-def table_of(**changes):
-    table = {"drive_angle": np.concatenate([UP, DOWN]), "holding_moment": 0.1, **changes}
-    return {name: values for name, values in table.items() if values is not None}
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_a_file_without_sweeps_is_split(tmp_path, suffix):
     missing = ("force_x", "force_y")
     labels = {"sweep": np.repeat([0, 1], 101), "direction": np.repeat(["forward", "backward"], 101)}
-    record = make_record(table_of(**labels), Rig(file={"missing": missing}))
+    table = {"drive_angle": np.concatenate([UP, DOWN]), "holding_moment": 0.1}
+    record = make_record(table | labels, Rig(file={"missing": missing}))
     path = tmp_path / f"record{suffix}"
     if suffix == ".nc":
         record.drop_vars(["sweep", "direction"]).to_netcdf(path, engine="h5netcdf")

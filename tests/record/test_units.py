@@ -52,18 +52,12 @@ def test_units_convert_there_and_back(values, length, rigidity, diameter, turn):
     assert back.attrs["load_cell_force_noise"] == pytest.approx(0.5, rel=1e-15)
 
 
-def test_a_record_in_si_stays_so_with_its_own_rod_only():
+def test_what_cannot_be_converted_is_refused():
     si = make_record(columns(), Rig(rod=WIRE))
     assert to_si(si, WIRE) is si
     with refused(RecordError, "SI already", "Rod(length=0.2,"):
         to_si(si, Rod(0.1, 1e-5))
-
-
-def test_a_rod_of_another_diameter_is_refused():
     with refused(RecordError, "Rod(length=1.0, flexural_rigidity=1.0, diameter=0.0)", "rod lengths"):
         to_si(make_record(columns()), WIRE)
-
-
-def test_a_conversion_that_overflows_is_refused():
     with refused(RecordError, "sample 5, column 'force_y'", "inf"):
         to_dimensionless(make_record(edited("force_y", 5, 1e308), Rig(rod=WIRE)))

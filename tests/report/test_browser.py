@@ -16,13 +16,14 @@ pytestmark = [
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromedriver on the PATH"),
 ]
 
-OPTIONS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-dev-shm-usage",
-    "--force-device-scale-factor=1",
-)
+OPTIONS = "headless=new", "no-sandbox", "disable-gpu", "disable-dev-shm-usage", "force-device-scale-factor=1"
+
+
+class Keys:
+    """Codes of WebDriver, section 17.4.2."""
+
+    PAGE_UP, PAGE_DOWN, END, HOME, ARROW_LEFT = "\ue00e\ue00f\ue010\ue011\ue012"
+    ARROW_RIGHT, ARROW_DOWN, SPACE, TAB = "\ue014\ue015\ue00d\ue004"
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def driver():
     options = Options()
     options.binary_location = CHROMIUM
     for option in OPTIONS:
-        options.add_argument(option)
+        options.add_argument(f"--{option}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     service = Service(executable_path=DRIVER)
     browser = webdriver.Chrome(options=options, service=service)
@@ -51,10 +52,14 @@ def path(tmp_path_factory):
     return write_report(folder)
 
 
-def shown(driver, path, *, width=1200, **media):
-    """Open a page on a screen of a width, with what the system asks for."""
+def widen(driver, width):
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def shown(driver, path, *, width=1200, **media):
+    """Open a page on a screen of a width, with what the system asks for."""
+    widen(driver, width)
     wanted = [{"name": name.replace("_", "-"), "value": value} for name, value in media.items()]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": wanted})
     driver.get(path.as_uri())
@@ -96,8 +101,6 @@ def state(driver):
 
 
 def test_the_slider_moves_rod_contact_wrench_and_marks_together(page):
-    from selenium.webdriver.common.keys import Keys
-
     before = state(page)
     press(page, "sample", Keys.ARROW_LEFT)
     after = state(page)
@@ -112,8 +115,6 @@ def test_the_slider_moves_rod_contact_wrench_and_marks_together(page):
 
 
 def test_the_keyboard_goes_through_a_sweep(page):
-    from selenium.webdriver.common.keys import Keys
-
     last = int(by(page, "sample").get_attribute("max"))
     for key, expected in (
         (Keys.HOME, 0),
@@ -146,7 +147,6 @@ def test_sweeps_can_be_chosen(page):
 
 
 def test_it_plays_to_the_end_and_stops(page):
-    from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.ui import WebDriverWait
 
     last = by(page, "sample").get_attribute("max")
@@ -159,7 +159,6 @@ def test_it_plays_to_the_end_and_stops(page):
 
 def test_the_band_is_told_by_key_and_pointer(page):
     from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.keys import Keys
 
     said = [by(page, "band-said").text]
     press(page, "band-place", Keys.HOME)
@@ -177,8 +176,6 @@ def test_the_band_is_told_by_key_and_pointer(page):
 
 
 def test_focus_is_seen(page):
-    from selenium.webdriver.common.keys import Keys
-
     page.find_element("css selector", "body").send_keys(Keys.TAB)
     style = page.execute_script("return getComputedStyle(document.activeElement).outlineStyle")
     assert style == "solid"
@@ -224,11 +221,8 @@ def test_it_fits_and_can_be_read(driver, path, width, scheme):
 
 def test_the_numbers_of_a_sample_fit_beside_any_rod(page):
     """Without scrolling, and whatever sample is shown they are as high."""
-    from selenium.webdriver.common.keys import Keys
-
     for width in (400, 640, 959, 960, 1100, 1400):
-        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-        page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        widen(page, width)
         heights = set()
         for key in (Keys.HOME, Keys.PAGE_UP, Keys.END):
             press(page, "sample", key)
@@ -253,7 +247,6 @@ def test_who_wants_less_motion_gets_the_slider_alone(driver, path):
     assert by(page, "sample").is_displayed()
 
 
-@pytest.mark.slow
 def test_no_text_of_a_record_runs_or_becomes_an_element(driver, tmp_path_factory):
     from selenium.common.exceptions import NoAlertPresentException
 
@@ -264,11 +257,10 @@ def test_no_text_of_a_record_runs_or_becomes_an_element(driver, tmp_path_factory
     assert page.execute_script("return document.scripts.length") == 2
     assert driver.get_log("browser") == []
     before = state(page)
-    by(page, "sample").send_keys("\ue012")  # the left arrow
+    press(page, "sample", Keys.ARROW_LEFT)
     assert state(page)["rod"] != before["rod"]
 
 
-@pytest.mark.slow
 def test_a_script_that_was_put_in_would_not_run(driver, path, tmp_path):
     """That the page's own policy holds, were an escape ever forgotten."""
     text = path.read_text(encoding="utf-8").replace("<main>", "<main><script>document.title = 'broken in'</script>", 1)

@@ -117,16 +117,15 @@ def test_a_unit_that_is_assumed_and_an_overlay_elsewhere_are_said(runs, tmp_path
 
 
 def test_what_cannot_be_reported_is_refused(runs, points, tmp_path):
-    one, two = runs / "one", runs / "t<wo"
-    with refused(ParameterError, "say --out"):
-        write_report([one, two])
-    with refused(ParameterError, "no runs"):
-        write_report([])
-    with refused(ParameterError, "compare is for one run"):
-        write_report([one, two], tmp_path / "p.html", compare=one)
-    with refused(ParameterError, "give each once"):
-        write_report([one, one / ".." / "one"], tmp_path / "p.html")
-    with refused(ParameterError, "would replace"):
-        write_report(one, points, overlay=points)
+    one, two, page = runs / "one", runs / "t<wo", tmp_path / "p.html"
+    for arguments, options, word in (
+        ([[one, two]], {}, "say --out"),
+        ([[]], {}, "no runs"),
+        ([[one, two], page], {"compare": one}, "compare is for one run"),
+        ([[one, one / ".." / "one"], page], {}, "give each once"),
+        ([one, points], {"overlay": points}, "would replace"),
+    ):
+        with refused(ParameterError, word):
+            write_report(*arguments, **options)
     with refused(InferenceError, "holds no posterior.nc"):
-        write_report([one, tmp_path], tmp_path / "p.html")
+        write_report([one, tmp_path], page)

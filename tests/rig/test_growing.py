@@ -32,10 +32,6 @@ def write(path, *parts):
     return path
 
 
-def polled(path):
-    return GrowingRecord(path).poll()
-
-
 def with_cell(row, place, text):
     cells = row.rstrip("\n").split(",")
     cells[place] = text
@@ -125,7 +121,7 @@ def test_rows_that_no_record_can_have_are_told_once_and_left_out(path, lines, me
 def test_many_rows_with_the_same_fault_are_one_message(path, lines):
     head, rows = lines
     spoilt = [with_cell(row, FORCE, "nan") if 5 <= k < 12 else row for k, row in enumerate(rows[:30])]
-    (message,) = polled(write(path, head, spoilt)).messages
+    (message,) = GrowingRecord(write(path, head, spoilt)).poll().messages
     first = len(head) + 6
     assert f"line {first}, " in message
     assert f"and 6 more, up to line {first + 6} " in message
@@ -142,74 +138,61 @@ def test_samples_before_the_sensor_speaks_are_waited_for(path, lines):
     assert growing.poll().record.sizes["sample"] == 6
 
 
-def test_a_file_that_is_mostly_unreadable_is_an_error_until_it_is_not(path, lines):
+def test_a_file_that_is_mostly_unreadable_or_has_wrong_columns_is_an_error(path, lines):
     """Such as angles in degrees, of which a few are less than a turn in radians."""
     head, rows = lines
-    growing = GrowingRecord(write(path, head, [with_cell(row, ANGLE, str(k)) for k, row in enumerate(rows[:80])]))
-    now = growing.poll()
+    now = GrowingRecord(write(path, head, [with_cell(row, ANGLE, str(k)) for k, row in enumerate(rows[:80])])).poll()
     assert now.record is None
     assert "look like degrees" in str(now.error)
-
-
-def test_what_is_wrong_with_the_columns_is_an_error(path, lines):
-    now = polled(write(path, ["sweep,direction,drive_angle\n", "0,forward,1.2\n"]))
-    with refused(RecordError, "there is no column 'holding_moment'"):
-        raise now.error
-    assert not now.error.lines
+    error = GrowingRecord(write(path, ["sweep,direction,drive_angle\n", "0,forward,1.2\n"])).poll().error
+    assert isinstance(error, RecordError)
+    assert "column 'holding_moment'" in str(error)
+    assert not error.lines
 
 
 # --- The order of samples ------------------------------------------------------------------------------------------
 
 
-def kept(path, lines, order):
-    """The message on a file with these rows, and the rows that are left out."""
+TURN = 79  # samples of the forward sweep
+
+
+@pytest.mark.parametrize(
+    ("order", "left_out"),
+    [
+        ([*range(20), 3, 4, *range(20, 30)], [20, 21]),  # far behind
+        ([*range(15), 16, 15, *range(17, 30)], []),  # neighbours in the other order
+        ([*range(20), 35, *range(20, 30)], []),  # far ahead, which does not make the others late
+        ([*range(TURN + 8), 5, *range(TURN + 8, TURN + 12)], [TURN + 8]),  # of a sweep that was over
+    ],
+)
+def test_samples_that_come_too_late_are_told_and_left_out(path, lines, order, left_out):
     head, rows = lines
-    now = polled(write(path, head, [rows[k] for k in order]))
-    angles = [float(rows[k].split(",")[ANGLE]) for k in order]
-    found, out = now.record.drive_angle.values.tolist(), []
-    for k, angle in enumerate(angles):
-        if len(found) > k - len(out) and found[k - len(out)] == angle:
-            continue
-        out.append(k)
-    return now.messages, out
+    now = GrowingRecord(write(path, head, [rows[k] for k in order])).poll()
+    angles = np.array([float(rows[k].split(",")[ANGLE]) for k in order])
+    np.testing.assert_array_equal(now.record.drive_angle, np.delete(angles, left_out))
+    messages = "".join(now.messages)
+    assert all(f"line {len(head) + 1 + k}" in messages for k in left_out)
+    assert bool(now.messages) is bool(left_out)
 
 
-def test_a_sample_far_behind_is_told_and_left_out(path, lines):
-    messages, out = kept(path, lines, [*range(20), 3, 4, *range(20, 30)])
-    assert out == [20, 21]
-    assert f"line {len(lines[0]) + 21}: sweep 0 at a drive angle of" in messages[0]
-    assert f"and line {len(lines[0]) + 22} " in messages[0]
-
-
-def test_neighbours_in_the_other_order_are_kept(path, lines):
-    assert kept(path, lines, [*range(15), 16, 15, *range(17, 30)]) == ((), [])
-
-
-def test_a_sample_far_ahead_does_not_make_the_others_late(path, lines):
-    messages, out = kept(path, lines, [*range(20), 35, *range(20, 30)])
-    assert (messages, out) == ((), [])
-
-
-def test_a_sweep_that_was_over_and_a_stray_number_are_told(path, lines, measured):
-    turn = int((measured.direction == "forward").sum())
-    assert kept(path, lines, [*range(turn + 8), 5, *range(turn + 8, turn + 12)])[1] == [turn + 8]
+def test_a_stray_number_of_a_sweep_is_told(path, lines, measured):
+    assert (measured.direction == "forward").sum() == TURN
     head, rows = lines
-    stray = [*rows[:10], with_cell(rows[10], SWEEP, "7"), *rows[11:30]]
-    now = polled(write(path, head, stray))
+    now = GrowingRecord(write(path, head, [*rows[:10], with_cell(rows[10], SWEEP, "7"), *rows[11:30]])).poll()
     assert now.record.sizes["sample"] == 29
     assert set(now.record.sweep.values.tolist()) == {0}
     assert "sweep 7" in now.messages[0]
 
 
 @pytest.mark.parametrize("quantum", [0.0, 0.004])
-def test_the_scatter_of_an_encoder_is_no_fault(path, measured, quantum):
+def test_the_scatter_of_an_encoder_is_no_fault(path, quantum):
     """Noise of three steps, or counts of as much, leave out none of 2,000 samples."""
     count = 2000
     angle = np.linspace(0.5, 2.5, count) + np.random.default_rng(1).normal(0.0, 0.003, count)
     if quantum:
         angle = np.round(angle / quantum) * quantum
     rows = [f"0,forward,{value!r},0.1,0.1,0.1\n" for value in angle.tolist()]
-    now = polled(write(path, ["sweep,direction,drive_angle,holding_moment,force_x,force_y\n"], rows))
+    now = GrowingRecord(write(path, ["sweep,direction,drive_angle,holding_moment,force_x,force_y\n"], rows)).poll()
     assert now.messages == ()
     assert now.record.sizes["sample"] == count
 

@@ -23,13 +23,6 @@ RECORD = swept(PIN, bases=((0.0, 0.0), (0.02, 0.006)), rod=ROD, step=0.1)
 NAMES = (*PARAMETERS, "base_2_x", "base_2_y")
 
 
-def experiment_of(name):
-    """An experiment in which a parameter is unknown."""
-    cell = None if name in ("moment_noise", "force_noise") else CELL
-    gauge = Gauge(PIN) if name in GROUPS["gauge"] else None
-    return Experiment(RECORD, Rig(load_cell=cell, unknown=only(name)), "circle", gauge=gauge)
-
-
 def unit_of(row):
     """The unit of a parameter in calculations without dimensions, from the powers that its row states."""
     first = ROD.force_unit if row.name.startswith("force") else ROD.moment_unit
@@ -37,8 +30,11 @@ def unit_of(row):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_default_priors_are_those_of_the_table(name):
-    row, prior = parameter_named(name), experiment_of(name).priors[name]
+def test_default_priors_bounds_and_units_are_those_of_the_table(name):
+    cell = None if name in ("moment_noise", "force_noise") else CELL
+    gauge = Gauge(PIN) if name in GROUPS["gauge"] else None
+    experiment = Experiment(RECORD, Rig(load_cell=cell, unknown=only(name)), "circle", gauge=gauge)
+    row, prior, unknowns = parameter_named(name), experiment.priors[name], experiment.unknowns
     centre = STATED.get(name, row.neutral)
     width = row.width * (unit_of(row) if row.default in ("normal", "half_normal") else 1.0)
     if row.default == "log_uniform":
@@ -53,21 +49,15 @@ def test_default_priors_are_those_of_the_table(name):
         at = centre + width * np.array([-0.5, 0.0, 1.0])
         at = at[(at > row.low) & (at < row.high)]
         np.testing.assert_allclose(np.diff(prior.logpdf(at)), np.diff(-0.5 * ((at - centre) / width) ** 2), rtol=1e-9)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_bounds_and_units_are_those_of_the_table(name):
-    row, experiment = parameter_named(name), experiment_of(name)
-    low, high = experiment.priors[name].support()
-    if name in experiment.unknowns.names:
-        assert experiment.unknowns.bounds(name) == (row.low, row.high)
-        assert row.name in (*GROUPS["gauge"], "base_2_x", "base_2_y") or experiment.unknowns.units[
-            name
-        ] == pytest.approx(unit_of(row))
+    low, high = prior.support()
     if row.default != "normal" or name in ("taper", "stem"):  # the bounds cut off the others
         assert low >= row.low - 1e-9
     if name == "taper":
         assert high <= row.high + 1e-9
+    if name in unknowns.names:
+        assert unknowns.bounds(name) == (row.low, row.high)
+        if name not in (*GROUPS["gauge"], "base_2_x", "base_2_y"):
+            assert unknowns.units[name] == pytest.approx(unit_of(row))
 
 
 @pytest.mark.parametrize("name", PARAMETERS)

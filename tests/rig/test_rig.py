@@ -1,8 +1,6 @@
 """A rig: what is known and unknown of it, by one rule; names that are refused; and its way to other processes."""
 
 import copy
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -17,7 +15,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.file_format import FileFormat
-from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, STANDARD, members
+from tactile_bayes.rig.parameters import GROUPS, STANDARD, members
 from tactile_bayes.rig.rig import rig_of
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated
@@ -116,15 +114,15 @@ def test_the_shifts_of_all_pivots_are_a_group():
     assert known == {"base_2_x": 0.01, "base_3_x": 0.01}
 
 
-HIDDEN = {
-    "a channel that is missing": (("holding_moment",), {"moment_bias", "lever_x", "lever_y", "moment_gain"}),
-    "another one": (("force_x",), {"force_x_bias", "force_x_gain"}),
-}
-
-
-@pytest.mark.parametrize(("missing", "names"), HIDDEN.values(), ids=HIDDEN)
+@pytest.mark.parametrize(
+    ("missing", "names"),
+    [
+        ("holding_moment", {"moment_bias", "lever_x", "lever_y", "moment_gain"}),
+        ("force_x", {"force_x_bias", "force_x_gain"}),
+    ],
+)
 def test_an_unknown_that_the_record_does_not_show_is_left_out(missing, names):
-    record = RECORD.assign({name: np.nan * RECORD[name] for name in missing})
+    record = RECORD.assign({missing: np.nan * RECORD[missing]})
     said = {**NOTHING, **dict.fromkeys(names, "default"), "rest_curvature": stats.norm(0.0, 0.1), "gauge": "default"}
     assert unknown_of(said, record) == ("rest_curvature",)
     assert set(unknown_of(said)) == {*names, "rest_curvature"}
@@ -169,18 +167,15 @@ def test_what_cannot_be_said_of_a_rig_is_refused(said, words):
         Rig(unknown=said)
 
 
-@pytest.mark.parametrize("part", ["rod", "load_cell", "file"])
-def test_parts_of_another_kind_are_refused(part):
-    with pytest.raises(ParameterError, match=part):
-        Rig(**{part: 0.2})
-
-
 def test_what_is_no_rig_is_refused():
-    with pytest.raises(ParameterError, match=r"posterior is 0\.2"):
+    for part in ("rod", "load_cell", "file"):
+        with refused(ParameterError, part):
+            Rig(**{part: 0.2})
+    with refused(ParameterError, "posterior", "0.2"):
         Rig.of(0.2)
-    assert rig_of(None).entries == {}
-    with pytest.raises(ParameterError, match=r"rig is 0.2: give Rig\("):
+    with refused(ParameterError, "rig", "0.2", "Rig("):
         rig_of(0.2)
+    assert rig_of(None).entries == {}
 
 
 def test_a_calibrated_parameter_is_not_unknown_as_well():
@@ -202,11 +197,10 @@ def test_of_a_rig_something_else_can_be_said():
 
 
 def test_a_rig_cannot_be_changed():
-    rig = Rig(unknown={"friction": 0.2})
-    with pytest.raises(TypeError):
-        rig.unknown["friction"] = 0.3
     given = {"friction": 0.2}
     rig = Rig(unknown=given)
+    with pytest.raises(TypeError):
+        rig.unknown["friction"] = 0.3
     given["friction"] = 0.5
     assert rig.known == {"friction": 0.2}
 
@@ -220,32 +214,11 @@ WHOLE = Rig(
 )
 
 
-def same(one, other):
-    """What can be said of two rigs is the same."""
-    assert one.text == other.text
-    assert one.file == other.file
-    assert list(one.entries) == list(other.entries)
-
-
 @pytest.mark.parametrize("travel", [copy.deepcopy, through_a_pipe])
 def test_a_rig_travels(travel):
-    same(travel(WHOLE), WHOLE)
+    found = travel(WHOLE)
+    assert (found.text, found.file, list(found.entries)) == (WHOLE.text, WHOLE.file, list(WHOLE.entries))
     assert travel(Rig(unknown="nothing")).entries == dict(NOTHING)
-
-
-def names_there(rig):
-    return Experiment(RECORD, Rig(load_cell=rig.load_cell, unknown=rig.unknown)).unknowns.names, rig.text
-
-
-@pytest.mark.slow
-def test_a_rig_travels_to_another_process():
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        assert pool.submit(names_there, WHOLE).result() == names_there(WHOLE)
-
-
-def test_every_name_is_one_of_the_table():
-    for name in (*PARAMETERS, *GROUPS, "base", "base_x", "base_4_y"):
-        assert list(Rig(unknown={name: "default"}).entries) == [name]
 
 
 def test_a_rig_shows_what_is_said_and_no_addresses():

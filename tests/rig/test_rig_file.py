@@ -85,21 +85,20 @@ CALIBRATION = RigPrior(
 )
 
 
-def rigs():
-    for name, rod in RODS.items():
-        yield f"rod, {name}", Rig(rod=rod)
-    for name, cell in CELLS.items():
-        yield f"load cell, {name}", Rig(load_cell=cell)
-    for name, said in SAID.items():
-        yield f"unknown, {name}", Rig(unknown=said)
-    for name, form in FORMATS.items():
-        yield f"file, {name}", Rig(file=form)
-    yield "calibration", Rig(calibration=CALIBRATION)
-    of_rig = {"rod": RODS["SI, all"], "load_cell": CELLS["everything"], "file": FORMATS["of a rig"]}
-    yield "all", Rig(**of_rig, unknown={"friction": stats.halfnorm(scale=0.1), "bias": 0.0}, calibration=CALIBRATION)
-
-
-RIGS = dict(rigs())
+RIGS = {
+    **{f"rod, {name}": Rig(rod=rod) for name, rod in RODS.items()},
+    **{f"load cell, {name}": Rig(load_cell=cell) for name, cell in CELLS.items()},
+    **{f"unknown, {name}": Rig(unknown=said) for name, said in SAID.items()},
+    **{f"file, {name}": Rig(file=form) for name, form in FORMATS.items()},
+    "calibration": Rig(calibration=CALIBRATION),
+    "all": Rig(
+        rod=RODS["SI, all"],
+        load_cell=CELLS["everything"],
+        unknown={"friction": stats.halfnorm(scale=0.1), "bias": 0.0},
+        calibration=CALIBRATION,
+        file=FORMATS["of a rig"],
+    ),
+}
 
 
 def read(path, text):
@@ -112,10 +111,7 @@ def test_what_is_written_is_read_as_it_was(rig, tmp_path):
     path = tmp_path / "rig.toml"
     rig.write(path)
     again = Rig.read(path)
-    assert again.text == rig.text
-    assert again.rod == rig.rod
-    assert again.load_cell == rig.load_cell
-    assert again.file == rig.file
+    assert (again.text, again.rod, again.load_cell, again.file) == (rig.text, rig.rod, rig.load_cell, rig.file)
     assert list(again.entries) == list(rig.entries)
     for name, value in rig.entries.items():
         other = again.entries[name]
@@ -129,7 +125,6 @@ def test_what_is_written_is_read_as_it_was(rig, tmp_path):
 def test_a_calibration_is_read_as_it_was(tmp_path):
     Rig(calibration=CALIBRATION).write(tmp_path / "rig.toml")
     found = Rig.read(tmp_path / "rig.toml").calibration
-    np.testing.assert_array_equal(found.correlation, CALIBRATION.correlation)
     assert (found.error, found.source, dict(found.stated)) == (0.0123, "0f 1e", dict(CALIBRATION.stated))
     points = CALIBRATION.draw(np.random.default_rng(1), 20)
     np.testing.assert_allclose(found.log_dependence(points), CALIBRATION.log_dependence(points), rtol=1e-12)
@@ -141,7 +136,7 @@ def test_a_calibration_is_read_as_it_was(tmp_path):
 def test_distributions_of_ones_own_are_not_written(tmp_path):
     own = stats.rv_histogram((np.ones(4), np.linspace(0.3, 0.7, 5)))()
     rig = Rig(unknown={"friction": own})
-    with pytest.raises(ParameterError, match="cannot be written"):
+    with refused(ParameterError, "written"):
         rig.write(tmp_path / "rig.toml")
     assert list(tmp_path.iterdir()) == []
     assert rig.text == "not written"
@@ -188,53 +183,50 @@ def test_units_are_texts(tmp_path):
     assert rig.distributions["length"].mean() == pytest.approx(0.201)
 
 
+SHAPED = '[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\n'
+
+
+def write_shape(folder, x, y, names="x,y"):
+    rows = "".join(f"{a!r},{b!r}\n" for a, b in zip(x.tolist(), y.tolist(), strict=True))
+    (folder / "shape.csv").write_text(f"{names}\n{rows}", encoding="utf-8")
+
+
 def test_a_shape_is_found_beside_the_file(tmp_path, monkeypatch):
     folder = tmp_path / "rigs"
     folder.mkdir()
-    lines = "".join(f"{x!r},{y!r}\n" for x, y in zip((0.1 * S).tolist(), (0.02 * S**2).tolist(), strict=True))
-    (folder / "shape.csv").write_text(f"x,y\n{lines}", encoding="utf-8")
+    write_shape(folder, 0.1 * S, 0.02 * S**2)
     monkeypatch.chdir(tmp_path)
-    found = read(folder / "rig.toml", '[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\n').rod
-    assert found == RODS["traced"]
+    assert read(folder / "rig.toml", SHAPED).rod == RODS["traced"]
+    assert read(folder / "rig.toml", SHAPED + "elastic_strain = 0.002\n").rod.elastic_strain == 0.002
     with pytest.raises((ParameterError, FileNotFoundError), match=r"other\.csv"):
-        read(folder / "rig.toml", '[rod]\nshape = "other.csv"\nflexural_rigidity = 1e-5\n')
+        read(folder / "rig.toml", SHAPED.replace("shape.csv", "other.csv"))
 
 
 @pytest.mark.parametrize("key", ["rest_curvature = 1.0", "rest_curvature_deviation = 0.1", "taper_deviation = 0.01"])
 def test_what_follows_from_a_shape_is_not_stated_beside_it(tmp_path, key):
-    (tmp_path / "shape.csv").write_text("x,y\n" + "".join(f"{s},{0.2 * s * s}\n" for s in S), encoding="utf-8")
+    write_shape(tmp_path, S, 0.2 * S**2)
     with refused(ParameterError, "shape and", key.split()[0]):
-        read(tmp_path / "rig.toml", f'[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\n{key}\n')
-
-
-def test_the_largest_strain_may_be_stated_beside_a_shape(tmp_path):
-    (tmp_path / "shape.csv").write_text("x,y\n" + "".join(f"{s},{0.2 * s * s}\n" for s in S), encoding="utf-8")
-    tables = '[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\nelastic_strain = 0.002\n'
-    assert read(tmp_path / "rig.toml", tables).rod.elastic_strain == 0.002
+        read(tmp_path / "rig.toml", f"{SHAPED}{key}\n")
 
 
 def test_a_shape_may_have_diameters(tmp_path):
-    lines = "".join(f"{x} 0.0 {2.0 - 0.01 * x}\n" for x in np.linspace(0.0, 100.0, 20))
-    (tmp_path / "shape.csv").write_text(f"x[mm] y[mm] diameter[mm]\n{lines}".replace(" ", ";"), encoding="utf-8")
+    lines = "".join(f"{x};0.0;{2.0 - 0.01 * x}\n" for x in np.linspace(0.0, 100.0, 20))
+    (tmp_path / "shape.csv").write_text(f"x[mm];y[mm];diameter[mm]\n{lines}", encoding="utf-8")
     by_modulus = read(tmp_path / "rig.toml", '[rod]\nshape = "shape.csv"\nyoungs_modulus = "200 GPa"\n').rod
     assert by_modulus.diameter == pytest.approx(2e-3)
     assert by_modulus.taper == pytest.approx(0.5)
     assert by_modulus.flexural_rigidity == pytest.approx(2e11 * np.pi * 2e-3**4 / 64.0)
 
 
-@pytest.mark.parametrize("unit", ["mm", "cm"])
-def test_a_shape_has_the_unit_in_its_names(tmp_path, unit):
-    scale = {"mm": 1e-3, "cm": 1e-2}[unit]
-    points = np.column_stack([0.1 * S, 0.02 * S**2])
-    lines = "".join(f"{x!r},{y!r}\n" for x, y in (points / scale).tolist())
-    (tmp_path / "shape.csv").write_text(f"x [{unit}],y [{unit}]\n{lines}", encoding="utf-8")
-    text = '[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\n'
-    found = read(tmp_path / "rig.toml", text).rod
+@pytest.mark.parametrize(("unit", "scale"), [("mm", 1e3), ("cm", 1e2)])
+def test_a_shape_has_the_unit_in_its_names(tmp_path, unit, scale):
+    write_shape(tmp_path, scale * 0.1 * S, scale * 0.02 * S**2, f"x [{unit}],y [{unit}]")
+    found = read(tmp_path / "rig.toml", SHAPED).rod
     assert found.length == pytest.approx(RODS["traced"].length, rel=1e-12)
     assert not found.is_dimensionless
-    (tmp_path / "shape.csv").write_text(f"x [L],y [L]\n{lines}", encoding="utf-8")
+    write_shape(tmp_path, 0.1 * S, 0.02 * S**2, "x [L],y [L]")
     with refused(ParameterError, "shape.csv", "rod lengths"):
-        read(tmp_path / "rig.toml", text)
+        read(tmp_path / "rig.toml", SHAPED)
 
 
 def test_a_rig_without_a_rod_in_metres_has_no_units(tmp_path):
@@ -244,10 +236,16 @@ def test_a_rig_without_a_rod_in_metres_has_no_units(tmp_path):
     assert plain.load_cell == CELLS["noise"]
     assert plain.known["backlash"] == pytest.approx(np.radians(1.0))
     for text in ('[load_cell]\nforce_noise = "5 mN"', '[unknown]\nlever_x = "1 mm"', '[rod]\nstem = "1 mm"'):
-        with pytest.raises(ParameterError, match="dimensionless"):
+        with refused(ParameterError, "dimensionless"):
             read(tmp_path / "rig.toml", text)
 
 
+def calibrated(parameters, correlation):
+    stated = 'source = "0"\nerror = 0.01\nstated = {}'
+    return f"[calibration]\n{stated}\nparameters = {parameters}\ncorrelation = {correlation}"
+
+
+TWO = "{ lever_x = { normal = [0.0, 0.1] }, lever_y = { normal = [0.0, 0.1] } }"
 WRONG = {
     "no table": ("[road]", "did you mean 'rod'"),
     "no parameter": ("[unknown]\nfrictoin = 0.1", "did you mean 'friction'"),
@@ -269,6 +267,16 @@ WRONG = {
     "everything": ('unknown = "everything"', "unknown"),
     "no number": ("[rod]\nlength = nan\nflexural_rigidity = 1.0", "length"),
     "half a calibration": ("[calibration]\nerror = 0.1", "parameters"),
+    "one correlation of two": (calibrated(TWO, "[[1.0]]"), "does not fit"),
+    "correlations above one": (calibrated(TWO, "[[1.0, 2.0], [2.0, 1.0]]"), "no matrix of correlations"),
+    "covariances": (calibrated(TWO, "[[2.0, 0.0], [0.0, 1.0]]"), "no matrix of correlations"),
+    "correlations that are no number": (calibrated(TWO, "[[1.0, nan], [nan, 1.0]]"), "does not fit"),
+    "correlations that are text": (calibrated(TWO, '[["a", 0.0], [0.0, 1.0]]'), "correlation"),
+    "ragged correlations": (calibrated(TWO, "[[1.0, 0.0], [0.0]]"), "correlation"),
+    "a calibrated number": (calibrated("{ lever_x = 0.1 }", "[[1.0]]"), "lever_x"),
+    "nothing calibrated": (calibrated("{}", "[]"), "does not fit"),
+    "no calibrated parameter": (calibrated("{ rust = { normal = [0.0, 0.1] } }", "[[1.0]]"), "rust"),
+    "a list of calibrated ones": (calibrated("[1.0]", "[[1.0]]"), "parameters"),
     "no TOML": ("[rod\nlength", "line"),
     "deep": ("x = " + "[" * 5000 + "]" * 5000, "nested deeper"),
     "deep tables": ("[" + "a." * 5000 + "a]", "5001 parts"),
@@ -285,40 +293,9 @@ def test_what_is_wrong_with_a_file_is_named_with_it(text, words, tmp_path):
         read(tmp_path / "rig.toml", text)
 
 
-CALIBRATED = """
-[calibration]
-source = "0"
-error = 0.01
-stated = {{}}
-parameters = {parameters}
-correlation = {correlation}
-"""
-NORMAL = "{ lever_x = { normal = [0.0, 0.1] }, lever_y = { normal = [0.0, 0.1] } }"
-
-
-@pytest.mark.parametrize(
-    ("parameters", "correlation", "words"),
-    [
-        (NORMAL, "[[1.0]]", "does not fit"),
-        (NORMAL, "[[1.0, 2.0], [2.0, 1.0]]", "no matrix of correlations"),
-        (NORMAL, "[[2.0, 0.0], [0.0, 1.0]]", "no matrix of correlations"),
-        (NORMAL, "[[1.0, nan], [nan, 1.0]]", "does not fit"),
-        (NORMAL, '[["a", 0.0], [0.0, 1.0]]', "correlation"),
-        (NORMAL, "[[1.0, 0.0], [0.0]]", "correlation"),
-        ("{ lever_x = 0.1 }", "[[1.0]]", "lever_x"),
-        ("{}", "[]", "does not fit"),
-        ("{ rust = { normal = [0.0, 0.1] } }", "[[1.0]]", "rust"),
-        ("[1.0]", "[[1.0]]", "parameters"),
-    ],
-)
-def test_a_calibration_that_is_none_is_refused(parameters, correlation, words, tmp_path):
-    with pytest.raises(ParameterError, match=f"(?s)rig.toml.*{words}"):
-        read(tmp_path / "rig.toml", CALIBRATED.format(parameters=parameters, correlation=correlation))
-
-
 def test_bytes_that_are_no_text_are_refused(tmp_path):
     (tmp_path / "rig.toml").write_bytes(b"[rod]\nlength = 0.1 # \xff")
-    with pytest.raises(ParameterError, match=r"rig\.toml"):
+    with refused(ParameterError, "rig.toml"):
         Rig.read(tmp_path / "rig.toml")
     with pytest.raises(FileNotFoundError):
         Rig.read(tmp_path / "none.toml")

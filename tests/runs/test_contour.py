@@ -14,7 +14,6 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import to_dimensionless
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs import contour as module
 from tactile_bayes.runs.contour import RunFolder, analyse, complete
@@ -72,27 +71,47 @@ def test_the_summary_begins_with_the_messages(analysed):
     assert lines[-1] == run.posterior.attrs["message"]
 
 
-def test_where_no_contour_is_found_the_former_run_stays_whole(measured, tmp_path, monkeypatch):
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Runs without figures."""
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+
+
+@pytest.mark.parametrize(
+    ("error", "factor", "message"),
+    [
+        (InferenceError("no parabola was found."), 1.0, r"^no parabola was found\.$"),
+        (InferenceError("no parabola was found."), 1e3, r"^no parabola was found\. .*EI/L²"),
+        (RuntimeError("it broke"), 1.0, "^it broke$"),
+    ],
+)
+def test_without_a_posterior_the_former_run_stays_whole_and_wrong_units_are_suspected(
+    measured, tmp_path, monkeypatch, error, factor, message
+):
     def infer_nothing(*arguments, **options):
-        raise InferenceError("no parabola was found.")
+        raise error
 
     monkeypatch.setattr(module, "infer_contour", infer_nothing)
     (tmp_path / "report.html").write_text("of the posterior beside it", encoding="utf-8")
-    with pytest.raises(InferenceError):
-        analyse(measured, tmp_path, rng=1)
-    assert (tmp_path / "report.html").exists()
+    record = measured.assign(force_x=factor * measured.force_x, force_y=factor * measured.force_y)
+    with pytest.raises(type(error), match=message):
+        analyse(record, tmp_path, rng=1)
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
-def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path, monkeypatch):
-    def infer_nothing(*arguments, **options):
-        raise InferenceError("no parabola was found.")
+@pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])
+def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_path, probability):
+    with refused(ParameterError, probability=probability):
+        analyse(measured, tmp_path / "run", probability=probability, rng=1)
+    assert not (tmp_path / "run").exists()
 
-    monkeypatch.setattr(module, "infer_contour", infer_nothing)
-    wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
-    with pytest.raises(InferenceError, match=r"^no parabola was found\. .*EI/L²"):
-        analyse(wrong, tmp_path, rng=1)
-    with pytest.raises(InferenceError, match=r"^no parabola was found\.$"):
-        analyse(measured, tmp_path, rng=1)
+
+@pytest.mark.usefixtures("undrawn")
+def test_one_step_is_a_result_too(measured, tmp_path):
+    few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
+    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=few, rng=1)
+    assert not run.posterior.attrs["converged"]
+    assert "1 step: too few" in run.posterior.attrs["message"]
 
 
 def test_the_estimate_is_near_the_truth(analysed):
@@ -138,26 +157,20 @@ def test_a_dimensionless_record_with_unknown_noise(tmp_path):
     assert run.contacts.attrs["misfit_probability"] > 1e-4
 
 
-def test_a_run_that_writes_less_leaves_nothing_of_the_former_one(analysed, measured, tmp_path, monkeypatch):
+@pytest.mark.usefixtures("undrawn")
+def test_a_run_that_writes_less_leaves_nothing_of_the_former_one(analysed, measured, tmp_path):
     """Neither contacts, if a channel is missing, nor figures, nor what belongs to the former posterior."""
     run, _ = analysed
     former = [*INFERENCE, *OF_POSTERIOR]
     (tmp_path / "trust").mkdir()
     for name in (*former, "notes.txt", "comparison.nc"):
         (tmp_path / name).write_text("former", encoding="utf-8")
-    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    RunFolder(tmp_path).write_posterior(run.posterior)  # which removes all that belongs to another one at once
+    assert {path.name for path in tmp_path.iterdir()} == {"posterior.nc", "notes.txt", "comparison.nc", "trust"}
     complete(run.posterior, without(measured, "force_x"), tmp_path)
     left = {path.name for path in tmp_path.rglob("*")} - {"notes.txt", "comparison.nc", "trust"}
     assert left == {"summary.txt", "posterior.nc", "band.csv", "summary.csv"}
     assert all((tmp_path / name).read_bytes() != b"former" for name in left)
-
-
-def test_the_posterior_removes_what_belongs_to_a_former_one_at_once(analysed, tmp_path):
-    run, _ = analysed
-    for name in INFERENCE:
-        (tmp_path / name).write_text("former", encoding="utf-8")
-    RunFolder(tmp_path).write_posterior(run.posterior)
-    assert [path.name for path in tmp_path.iterdir()] == ["posterior.nc"]
 
 
 @pytest.mark.slow
@@ -168,32 +181,6 @@ def test_another_rod_is_that_of_all_results(measured, tmp_path):
     assert run.posterior.attrs["rod_length"] == ROD.length
     expected = contact_points(measured, run.posterior, None)
     np.testing.assert_array_equal(run.contacts.contact_x, expected.contact_x)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("quick")
-def test_units_do_not_matter(analysed, measured, tmp_path):
-    """To the rounding of the conversion; priors and random numbers scale with the rod."""
-    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path, rig=Rig(unknown="nothing"), rng=1)
-    ratio = si.contacts.contact_x / plain.contacts.contact_x
-    np.testing.assert_allclose(ratio[si.contacts.status == "ok"], ROD.length, rtol=1e-9)
-    medians = [summary(run.posterior)["median"].sel(quantity="q").item() for run in (si, plain)]
-    assert medians[0] / ROD.length == pytest.approx(medians[1], rel=0.01)
-
-
-def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
-    few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
-    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=few, rng=1)
-    assert not run.posterior.attrs["converged"]
-    assert "1 step: too few" in run.posterior.attrs["message"]
-
-
-@pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])
-def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_path, probability):
-    with refused(ParameterError, probability=probability):
-        analyse(measured, tmp_path / "run", probability=probability, rng=1)
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.fixture
@@ -221,9 +208,8 @@ def broken(*arguments, **options):
         ("check", "check", None),
     ],
 )
-@pytest.mark.usefixtures("drawn_before")
+@pytest.mark.usefixtures("drawn_before", "undrawn")
 def test_what_fails_is_named_and_left_out_and_all_else_is_there(function, what, file, measured, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     whole = analyse(measured, tmp_path, rng=1)
     monkeypatch.setattr(module, function, broken)
     run = analyse(measured, tmp_path, rng=1)
@@ -257,10 +243,10 @@ def test_a_figure_that_fails_is_named_and_the_others_are_drawn(measured, tmp_pat
     assert all(re.search(f"\nLeft out: figure {name}.*RuntimeError: it broke\n", text) for name in failed)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
     """Its draws and what is made of them alone are there; all else says what it lacks."""
     monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", broken)
-    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK, rng=1)
     assert list(run.left_out) == ["predictions", "band", "gap", "check"]
     assert re.fullmatch("Left out: predictions.*: it broke", run.messages[0])
@@ -271,10 +257,3 @@ def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
     assert stored["posterior"].sizes["draw"] == 300
     assert stored.attrs["probability"] == 0.95
     assert run.summary.quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
-
-
-def test_what_fails_before_a_posterior_is_drawn_is_passed_on(measured, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "infer_contour", broken)
-    with pytest.raises(RuntimeError, match="it broke"):
-        analyse(measured, tmp_path, rng=1)
-    assert not any(tmp_path.iterdir())

@@ -39,42 +39,23 @@ def test_the_truth_that_is_printed_is_that_of_the_contour():
     assert {name: TRUTH[name] for name in ("a", "q", "x_c")} == vars(CONTOUR)
 
 
-def test_the_seed_decides(path, tmp_path):
-    assert measure_demo(tmp_path / "same", rng=1)[0].read_bytes() == path.read_bytes()
-    assert measure_demo(tmp_path / "other", rng=2)[0].read_bytes() != path.read_bytes()
+def test_the_seed_decides_and_a_demonstration_is_replaced_by_another(path, tmp_path):
+    assert measure_demo(tmp_path, rng=1)[0].read_bytes() == path.read_bytes()
+    assert measure_demo(tmp_path, rng=2)[0].read_bytes() != path.read_bytes()
 
 
-def test_a_demonstration_is_replaced_by_another(tmp_path):
-    before = measure_demo(tmp_path, rng=1)[0].read_bytes()
-    assert measure_demo(tmp_path, rng=2)[0].read_bytes() != before
-
-
-def _of_another_rod(record):
-    return record.assign_attrs(rod_length=2.0 * record.attrs["rod_length"])
-
-
-def _of_fewer_samples(record):
-    return record.isel(sample=slice(0, -1))
-
-
-@pytest.mark.parametrize("changed", [_of_another_rod, _of_fewer_samples])
-def test_another_record_is_not_replaced(changed, path, tmp_path):
-    own = tmp_path / "record.csv"
-    write_record(changed(read_record(path)), own)
-    _is_refused(own)
-
-
-@pytest.mark.parametrize("text", ["", "notes\n1\n"])
-def test_another_file_is_not_replaced(text, tmp_path):
-    own = tmp_path / "record.csv"
-    own.write_text(text)
-    _is_refused(own)
-
-
-def _is_refused(own):
-    before, beside = own.read_bytes(), own.with_name("posterior.nc")
+@pytest.mark.parametrize("what", ["another rod", "fewer samples", "", "notes\n1\n"])
+def test_what_is_no_demonstration_is_not_replaced(path, tmp_path, what):
+    own, beside = tmp_path / "record.csv", tmp_path / "posterior.nc"
+    if what == "another rod":
+        write_record(read_record(path).assign_attrs(rod_length=2.0 * ROD.length), own)
+    elif what == "fewer samples":
+        write_record(read_record(path).isel(sample=slice(0, -1)), own)
+    else:
+        own.write_text(what)
+    before = own.read_bytes()
     beside.touch()
     with pytest.raises(ParameterError, match=r"record\.csv is no record"):
-        measure_demo(own.parent, rng=1)
+        measure_demo(tmp_path, rng=1)
     assert own.read_bytes() == before
     assert beside.exists()

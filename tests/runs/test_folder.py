@@ -1,7 +1,9 @@
 """The folder of a run: the files of one run replace those of the former one together."""
 
+import matplotlib as mpl
 import pytest
 import xarray as xr
+from matplotlib import pyplot as plt
 
 from tactile_bayes.runs.folder import Folder, panels
 
@@ -65,20 +67,6 @@ def test_a_folder_in_place_of_a_file_is_kept(tmp_path):
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["data.nc", "table.csv", "years of work"]
 
 
-def test_a_name_that_is_not_known_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="not among the files"), Folder(tmp_path, NAMES) as folder:
-        folder.write_lines("other", "other.txt", ["new"])
-
-
-def test_a_figure_of_pyplot_is_closed(tmp_path):
-    from matplotlib import pyplot as plt
-
-    before = plt.get_fignums()
-    with Folder(tmp_path, NAMES) as folder:
-        folder.draw("figure", "figure.png", lambda: plt.subplots(figsize=(1.0, 1.0))[1])
-    assert plt.get_fignums() == before
-
-
 ODD = {
     "LaTeX": {"text.usetex": True},
     "numbers": {"axes.formatter.use_locale": True, "axes.unicode_minus": False, "axes.formatter.limits": [0, 0]},
@@ -90,25 +78,28 @@ ODD = {
 }
 
 
-def axes():
-    ax = panels(1, 1, 2.0, 1.5)[0, 0]
-    ax.plot([-1e5, 1e5], [-1.0, 1.0])
-    ax.set_xlabel("$x$ − y")
-    return ax
-
-
-def drawn(folder):
-    with Folder(folder, NAMES) as results:
-        results.draw("figure", "figure.png", axes)
-    return results.files["figure"].read_bytes()
-
-
 @pytest.mark.parametrize("odd", ODD)
 def test_settings_of_the_user_do_not_change_a_figure(tmp_path, odd):
-    import matplotlib as mpl
+    def axes():
+        ax = panels(1, 1, 2.0, 1.5)[0, 0]
+        ax.plot([-1e5, 1e5], [-1.0, 1.0])
+        ax.set_xlabel("$x$ − y")
+        return ax
+
+    def drawn(folder):
+        with Folder(folder, NAMES) as results:
+            results.draw("figure", "figure.png", axes)
+        return results.files["figure"].read_bytes()
 
     expected = drawn(tmp_path / "usual")
     with mpl.rc_context(ODD[odd]):
         before = mpl.rcParams.copy()
         assert drawn(tmp_path / "odd") == expected
         assert mpl.rcParams == before
+
+
+def test_a_figure_of_pyplot_is_closed(tmp_path):
+    before = plt.get_fignums()
+    with Folder(tmp_path, NAMES) as folder:
+        folder.draw("figure", "figure.png", lambda: plt.subplots(figsize=(1.0, 1.0))[1])
+    assert plt.get_fignums() == before

@@ -74,10 +74,6 @@ def test_what_is_done_is_not_made_again_and_records_may_be_added(made, records, 
     assert again["median"].sel(record="one").equals(table["median"].sel(record="one"))
 
 
-def _files(folder):
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 @pytest.mark.parametrize(
     ("rig", "other", "said"),
     [
@@ -90,23 +86,17 @@ def _files(folder):
 )
 def test_a_run_that_was_made_otherwise_is_not_replaced(made, records, rig, other, said):
     _, out = made
-    before = _files(out)
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     with refused(ParameterError, str(out / "one"), said, "--out", "remove"):
         many.infer_contours(records / "one.csv", rig, out=out, **(OPTIONS | other))
-    assert _files(out) == before
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
-@pytest.fixture
-def added(made, tmp_path):
-    """A copy of the runs, and a new record with the name of one of them."""
-    out = shutil.copytree(made[1], tmp_path / "runs")
-    (tmp_path / "later").mkdir()
-    write_record(coarse_record().isel(sample=slice(2, None)), tmp_path / "later" / "one.csv")
-    return out, tmp_path / "later" / "one.csv"
-
-
-def test_a_later_call_adds_to_the_table_and_renames_nothing(made, records, added, monkeypatch):
-    out, later = added
+def test_a_later_call_adds_to_the_table_and_renames_nothing(made, records, tmp_path, monkeypatch):
+    """In a copy of the runs, of a new record with the name of one of them."""
+    out, later = shutil.copytree(made[1], tmp_path / "runs"), tmp_path / "later" / "one.csv"
+    later.parent.mkdir()
+    write_record(coarse_record().isel(sample=slice(2, None)), later)
     row = {"error": "", "seconds": 1.0, "verdict": "All is well."}
     seen = []
     monkeypatch.setattr(many, "_analysed", lambda task: seen.append(task.out.name) or row)
@@ -122,41 +112,24 @@ def test_a_later_call_adds_to_the_table_and_renames_nothing(made, records, added
     again = many.infer_contours([records / "one.csv", later], STATED, out=out, **OPTIONS)
     assert seen == ["later-one"]  # its run has not been written
     assert sorted(again.record.values) == sorted(table.record.values)
-
-
-def test_a_run_that_was_made_alone_keeps_its_folder(made, added, records, monkeypatch):
-    out, _ = added
-    (out / "one" / many.ROW).unlink()
-    seen = []
-    monkeypatch.setattr(many, "_analysed", lambda task: seen.append(task.out.name) or {"error": "x", "seconds": 0.0})
+    (out / "one" / many.ROW).unlink()  # as of a run that was made alone, which keeps its folder
+    seen.clear()
     many.infer_contours(records / "one.csv", STATED, out=out, **OPTIONS)
     assert seen == [f"{records.name}-one"]
 
 
-def test_a_table_that_is_none_is_refused(records, tmp_path):
-    (tmp_path / "runs.nc").write_bytes(b"no table")
-    with refused(ParameterError, "runs.nc", "remove it"):
-        many.infer_contours(records / "one.csv", STATED, out=tmp_path, **OPTIONS)
-
-
-def test_names_that_are_the_same_take_those_of_their_folders(records, made, tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "one.csv").write_bytes((records / "one.csv").read_bytes())
-    assert many._names([tmp_path / "a" / "one.csv", tmp_path / "b" / "one.csv"], tmp_path) == ["a-one", "b-one"]
-    assert many._names([tmp_path / "a" / "one.csv", tmp_path / "b" / "one.csv"], made[1]) == ["one", "b-one"]
-    with refused(ParameterError, "a-one", "rename"):
-        many._names([tmp_path / "a" / "one.csv", tmp_path / "a" / "one.csv"], tmp_path)
-
-
-def test_a_record_is_not_replaced(records):
-    with refused(ParameterError, "runs.nc", "would replace"):
-        many.infer_contours([records / "one.csv", records / "runs.nc"], STATED, out=records, **OPTIONS)
-
-
-@pytest.mark.parametrize("given", [[], 3])
-def test_no_records_are_refused(given, tmp_path):
-    with pytest.raises(ParameterError):
-        many.infer_contours(given, STATED, out=tmp_path, **OPTIONS)
-    with refused(ParameterError, "holds no record"):
-        many.infer_contours(tmp_path, STATED, out=tmp_path, **OPTIONS)
+def test_what_cannot_be_is_refused(records, tmp_path):
+    one, empty, spoilt = records / "one.csv", tmp_path / "empty", tmp_path / "spoilt"
+    for folder in (empty, spoilt):
+        folder.mkdir()
+    (spoilt / "runs.nc").write_bytes(b"no table")
+    for given, out, named in (
+        ([], tmp_path, []),
+        (3, tmp_path, []),
+        (empty, tmp_path, ["holds no record"]),
+        ([one, one], tmp_path, ["one", "rename"]),
+        (one, spoilt, ["runs.nc", "remove it"]),
+        ([one, records / "runs.nc"], records, ["runs.nc", "would replace"]),
+    ):
+        with refused(ParameterError, *named):
+            many.infer_contours(given, STATED, out=out, **OPTIONS)

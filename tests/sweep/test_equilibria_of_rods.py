@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from helpers.profiled_rods import given_rod, given_rods
+from helpers.profiled_rods import given_rods
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ClearanceWarning, ContourError
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -24,14 +24,12 @@ CONTOURS = {
 COLUMNS = ("drive_angle", "holding_moment", "force_x", "force_y", "contact_arclength", "tip_angle")
 
 
-def states_of_sweep(contour, direction, rod, friction=0.0, drive_step=np.pi / 180):
+def states_of_sweep(contour, direction, rod, friction=0.0):
     """States in contact by the names of `equilibria`; None if there would be two contacts."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ClearanceWarning)
-            record = scan(
-                contour, direction=direction, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=drive_step
-            ).record
+            record = scan(contour, direction=direction, rig=Rig(rod=rod, unknown={"friction": friction})).record
     except ContourError:
         return None
     record = record.isel(sample=np.flatnonzero(record.truth_contact_phase.values != "none"))
@@ -75,31 +73,8 @@ def test_states_of_sweeps_once_the_contact_comes_back(name):
     assert same > 10 * different
 
 
-@pytest.mark.parametrize(("name", "height"), [("arc", 0.5), ("half cone", 0.75), ("parabolic", 0.7)])
-def test_backward_is_the_mirror_image(name, height):
-    """A mirrored contour with the mirrored rod: x → −x, φ0 → π − φ0, m0 and fAx change their signs."""
-    rod, plain = RODS[name]
-    mirrored = given_rod(lambda s: -plain.curvature(s), taper=rod.taper).rod
-    slopes = np.linspace(-0.1, 0.8, 10)
-    scene = Parabola(0.5, height, 0.1), "forward", rod
-    mirror = Parabola(0.5, height, -0.1), "backward", mirrored
-    states, mirror_states = (
-        equilibria(contour, sign * slopes, direction=direction, rig=Rig(rod=of_scene, unknown={"friction": 0.2}))
-        for sign, (contour, direction, of_scene) in ((1.0, scene), (-1.0, mirror))
-    )
-    for one, other in ((states, mirror_states), (states_of_sweep(*scene, 0.2), states_of_sweep(*mirror, 0.2))):
-        assert {"tip", "tangential"} <= set(one.contact_phase.values)
-        np.testing.assert_array_equal(other.contact_phase, one.contact_phase)
-        for column in ("drive_angle", "tip_angle"):
-            np.testing.assert_allclose(other[column], np.pi - one[column], atol=1e-11)
-        for column in ("holding_moment", "force_x", "contact_x"):
-            np.testing.assert_allclose(other[column], -one[column], atol=1e-11)
-        for column in ("force_y", "contact_y", "contact_arclength"):
-            np.testing.assert_allclose(other[column], one[column], atol=1e-11)
-
-
 @pytest.mark.parametrize("direction", ["forward", "backward"])
-def test_a_sweep_in_other_units(direction):
+def test_units_do_not_matter(direction):
     """A rod of SI that is the dimensionless one in units of its own."""
     length, rigidity = 0.08, 3e-5
     one = Rod(rest_curvature=lambda s: 0.4 - 0.9 * s, taper=0.5)
@@ -113,11 +88,6 @@ def test_a_sweep_in_other_units(direction):
     bare, of_si = (
         equilibria(c, slopes, direction=direction, rig=Rig(rod=r)) for c, r in zip(contours, (one, si), strict=True)
     )
-    bare_sweep, si_sweep = (
-        states_of_sweep(c, direction, r, drive_step=0.05) for c, r in zip(contours, (one, si), strict=True)
-    )
     np.testing.assert_array_equal(of_si.contact_phase, bare.contact_phase)
-    np.testing.assert_array_equal(si_sweep.contact_phase, bare_sweep.contact_phase)
     for column, unit in units.items():
         np.testing.assert_allclose(of_si[column] / unit, bare[column], atol=1e-10)
-        np.testing.assert_allclose(si_sweep[column] / unit, bare_sweep[column], atol=1e-10)

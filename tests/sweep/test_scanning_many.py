@@ -1,7 +1,5 @@
 """Many contours in one call, against one scan for each."""
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
 
@@ -16,46 +14,28 @@ TRUTH = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angl
 ANGLES = np.linspace(0.4, 3.6, 240)
 
 
-def parameters(count, *ranges):
-    rng = np.random.default_rng(7)
-    return [rng.uniform(low, high, count) for low, high in ranges]
+ROD = tb.Rod(0.2, 2.4e-3, 0.7e-3)
+LENGTH, COUNT = ROD.length, 5
+RNG = np.random.default_rng(7)
+SIZE, OTHER, POWER = (RNG.uniform(low, high, COUNT) for low, high in ((0.3, 1.5), (0.3, 1.0), (2.0, 5.0)))
+Q, X_C, *BASE = (LENGTH * RNG.uniform(*ends, COUNT) for ends in ((0.3, 0.7), (-0.2, 0.2), (-0.1, 0.1), (-0.1, 0.0)))
+CONTOURS = {
+    "parabola": Parabola(SIZE / LENGTH, Q, X_C),
+    "circle": Circle(SIZE * LENGTH, Q, X_C),
+    "ellipse": Ellipse(SIZE * LENGTH, OTHER * LENGTH, Q, X_C),
+    "power law": PowerLaw(SIZE * LENGTH ** (1.0 - POWER), POWER, Q, X_C),
+}
 
 
-@pytest.mark.parametrize(
-    ("family", "ranges"),
-    [
-        (Parabola, [(0.2, 3.0), (0.3, 0.7), (-0.2, 0.2)]),
-        (Circle, [(0.2, 1.5), (0.3, 0.7), (-0.2, 0.2)]),
-        (Ellipse, [(0.3, 1.5), (0.2, 1.0), (0.3, 0.7), (-0.2, 0.2)]),
-        (PowerLaw, [(0.3, 3.0), (2.0, 5.0), (0.3, 0.7), (-0.2, 0.2)]),
-    ],
-)
+@pytest.mark.parametrize("contours", CONTOURS.values(), ids=CONTOURS)
 @pytest.mark.parametrize(("direction", "friction"), [("forward", 0.0), ("backward", 0.3)])
-@pytest.mark.parametrize("rod", [pytest.param(None, marks=pytest.mark.slow), tb.Rod(0.2, 2.4e-3, 0.7e-3)])
-def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod):
-    length = rod.length if rod else 1.0
-    powers = {"a": 0 if family is Ellipse else -1, "n": 0, "b": 1, "r": 1, "q": 1, "x_c": 1}
-    if family is Ellipse:
-        powers["a"] = 1
-    names = [field.name for field in fields(family)]
-    values = dict(zip(names, parameters(5, *ranges), strict=True))
-    if family is PowerLaw:
-        values["a"] = values["a"] * length ** (1.0 - values["n"])
-        powers["a"] = 0
-    values = {name: value * length ** powers[name] for name, value in values.items()}
-    base = parameters(5, (-0.1 * length, 0.1 * length), (-0.1 * length, 0.0))
-    many = tb.scan_many(
-        family(**values), ANGLES, direction=direction, base=base, rig=Rig(rod=rod, unknown={"friction": friction})
-    )
+def test_each_is_what_its_own_scan_says(contours, direction, friction):
+    rig = Rig(rod=ROD, unknown={"friction": friction})
+    many = tb.scan_many(contours, ANGLES, direction=direction, base=BASE, rig=rig)
     assert set(many.status.values) == {"ok"}
-    for i in range(5):
-        one = tb.scan(
-            family(**{name: float(value[i]) for name, value in values.items()}),
-            direction=direction,
-            base=(float(base[0][i]), float(base[1][i])),
-            drive_angles=ANGLES,
-            rig=Rig(rod=rod, unknown={"friction": friction}),
-        )
+    for i in range(COUNT):
+        base = tuple(float(value[i]) for value in BASE)
+        one = tb.scan(contours.take(i), direction=direction, base=base, drive_angles=ANGLES, rig=rig)
         record = one.record.sortby("drive_angle")
         events = one.sweeps[0]
         mine = many.isel(contour=i)
@@ -67,7 +47,7 @@ def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod
                 mine[name].values, record[name].values, rtol=0, atol=1e-7 * largest, err_msg=name
             )
         for name in TRUTH:
-            scale = length if name.startswith("contact") else 1.0
+            scale = LENGTH if name.startswith("contact") else 1.0
             np.testing.assert_allclose(
                 mine[name].values[~near], record[f"truth_{name}"].values[~near], rtol=0, atol=2e-5 * scale, err_msg=name
             )
@@ -75,7 +55,7 @@ def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod
         for event in ("first_contact", "snap_off"):
             for name in ("drive_angle", "slope_angle", "contact_x", "contact_y"):
                 expected = getattr(getattr(events, event), name)
-                np.testing.assert_allclose(float(mine[f"{event}_{name}"]), expected, rtol=1e-9, atol=1e-9 * length)
+                np.testing.assert_allclose(float(mine[f"{event}_{name}"]), expected, rtol=1e-9, atol=1e-9 * LENGTH)
         kinds = [events.first_contact.kind, *(change.kind.split(" → ")[1] for change in events.transitions)]
         assert str(mine.phases.values) == "-".join("A" if kind == "tip" else "B" for kind in kinds)
 

@@ -13,7 +13,6 @@ from helpers.friction_cases import drawn_case
 from helpers.friction_scans import scanned
 from helpers.friction_stepper import step_through
 from helpers.handed_out import violations
-from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ClearanceWarning, ContourError, ReachError
 from tactile_bayes.rig import Rig
@@ -44,12 +43,6 @@ def test_without_friction_the_way_back_repeats_the_way_forth():
         np.testing.assert_allclose(record[name].values, record[name].values[::-1], atol=1e-8)
 
 
-def test_parts_of_a_drive_that_go_one_way_have_friction():
-    scan = tb.scan(PARABOLA, drive=tb.Motion(0.0, 0.0, [0.4, 2.2], drive_step=0.02), rig=Rig(unknown={"friction": 0.3}))
-    assert scan.sweeps[0].snap_off.kind == "never"
-    assert violations(scan, tb.Rod(), 0.3) == {}
-
-
 @pytest.mark.parametrize(("side", "heading"), [(1.0, np.pi), (-1.0, 0.0)])
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.5])
 def test_the_tip_of_an_upright_rod_slides_to_the_lowest_point(side, heading, friction):
@@ -65,12 +58,6 @@ def test_the_tip_of_an_upright_rod_slides_to_the_lowest_point(side, heading, fri
     assert first.contact_y - record.truth_contact_y.values[at] == pytest.approx(0.6 * d * d, rel=0.05)
     force = np.hypot(record.force_x.values[at], record.force_y.values[at])
     assert force == pytest.approx(3.0 * d / np.sin(slope), rel=0.1)
-
-
-def test_a_rod_that_is_carried_along_itself_buckles_either_way():
-    drive = tb.Translation((0.0, -0.5), UPRIGHT, UPRIGHT, 1.0)
-    with refused(ReachError, "friction", "head-on"):
-        tb.scan(Circle(0.3, 0.9), drive=drive, rig=Rig(unknown={"friction": 0.3}))
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])

@@ -28,30 +28,24 @@ def written(path, content="new"):
         temporary.write_text(content)
 
 
-def test_an_exception_in_the_middle_leaves_the_old_file(tmp_path):
-    path = tmp_path / "a.txt"
-    path.write_text("old")
-
-    def interrupted():
-        with write_atomically(path) as temporary:
-            temporary.write_text("half of the n")
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_the_new_file_appears_only_at_the_end_and_where_a_link_points(tmp_path):
     target, link = tmp_path / "a.txt", tmp_path / "link.txt"
     target.write_text("old")
     link.symlink_to(target)
-    with write_atomically(link) as temporary:
-        assert temporary.parent.parent == Path(tmp_path).resolve()  # on the same file system
-        assert temporary.name == "a.txt"
-        temporary.write_text("new")
-        assert target.read_text() == "old"
+
+    def written(error=None):
+        with write_atomically(link) as temporary:
+            assert temporary.parent.parent == tmp_path.resolve()  # on the same file system
+            assert temporary.name == "a.txt"
+            temporary.write_text("new")
+            assert target.read_text() == "old"
+            if error is not None:
+                raise error
+
+    with pytest.raises(KeyboardInterrupt):
+        written(KeyboardInterrupt())
+    assert target.read_text() == "old"
+    written()
     assert link.is_symlink()
     assert target.read_text() == "new"
     assert sorted(tmp_path.iterdir()) == [target, link]

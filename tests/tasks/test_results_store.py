@@ -8,7 +8,7 @@ import pytest
 from helpers.refusals import refused
 from tactile_bayes.calibration.replicate import REPLICATES, Outcome
 from tactile_bayes.errors import CalibrationError
-from tactile_bayes.tasks import ResultsStore, files, open_results_store
+from tactile_bayes.tasks import ResultsStore, open_results_store
 
 LEDGER = REPLICATES.file
 
@@ -19,20 +19,6 @@ ROWS = {
     0: Outcome({}, {"seconds": 1e-300}, 'InferenceError: "nothing"\nfits', 'File "a.py", line 1\n  in f\n'),
     11: Outcome({"a": 50}, {}, ""),
 }
-
-
-def equal(one, other):
-    """Whether two outcomes are the same, NaN and all."""
-    return (
-        dict(one.ranks) == dict(other.ranks)
-        and list(one.numbers) == list(other.numbers)
-        and all(v == w or (math.isnan(v) and math.isnan(w)) for v, w in zip(*map(_values, (one, other)), strict=True))
-        and (one.message, one.traceback) == (other.message, other.traceback)
-    )
-
-
-def _values(outcome):
-    return outcome.numbers.values()
 
 
 def filled(folder, words=WORDS):
@@ -56,38 +42,27 @@ def test_what_is_written_is_read(tmp_path):
     file = filled(tmp_path / "made" / "on the way")
     assert [path.name for path in file.parent.iterdir()] == [LEDGER]
     with open_results_store(WORDS, file.parent, REPLICATES) as store:
-        assert list(store.outcomes) == sorted(ROWS)
-        assert all(equal(store.outcomes[number], row) for number, row in ROWS.items())
-        assert all(type(rank) is int for row in store.outcomes.values() for rank in row.ranks.values())
+        assert repr(store.outcomes) == repr(dict(sorted(ROWS.items())))  # NaN and all
     written = file.read_bytes()
     filled(file.parent)
     assert file.read_bytes() == written
+    with open_results_store(WORDS, file.parent, REPLICATES) as store:
+        store.outcomes[4] = Outcome({"a": 7}, {}, "new")
+    assert list(ResultsStore(WORDS, file.parent, REPLICATES).outcomes) == [0, 3, 4, 11]
 
 
 def test_the_file_is_plain_json(tmp_path):
-    """Without the NaN that the standard does not know."""
-    table = json.loads(filled(tmp_path).read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    """Without the NaN that the standard does not know; older ones have no tracebacks, and what was lost there is."""
+    file = filled(tmp_path)
+    table = json.loads(file.read_text(encoding="utf-8"), parse_constant=pytest.fail)
     assert table["experiment"] == WORDS
     assert [row["number"] for row in table["replicates"]] == [0, 3, 11]
     assert table["replicates"][1]["numbers"]["width_in_gap"] is None
-
-
-def test_a_store_without_tracebacks_is_read(tmp_path):
-    """As older ones are; what was lost there is lost here."""
-    file = filled(tmp_path)
-    table = json.loads(file.read_text(encoding="utf-8"))
     assert [row.pop("traceback", None) is not None for row in table["replicates"]] == [True, False, False]
     file.write_text(json.dumps(table), encoding="utf-8")
     outcomes = ResultsStore(WORDS, tmp_path, REPLICATES).outcomes
-    assert all(equal(outcomes[number], row._replace(traceback="")) for number, row in ROWS.items())
+    assert repr(outcomes) == repr({number: ROWS[number]._replace(traceback="") for number in (0, 3, 11)})
     assert [outcomes[number].is_lost for number in (0, 3, 11)] == [True, False, False]
-
-
-def test_new_ones_are_added_to_those_that_are_there(tmp_path):
-    filled(tmp_path)
-    with open_results_store(WORDS, tmp_path, REPLICATES) as store:
-        store.outcomes[4] = Outcome({"a": 7}, {}, "new")
-    assert list(ResultsStore(WORDS, tmp_path, REPLICATES).outcomes) == [0, 3, 4, 11]
 
 
 def test_without_a_folder_it_is_kept_in_memory(tmp_path, monkeypatch):
@@ -108,28 +83,6 @@ def test_what_is_done_is_written_however_the_block_ends(tmp_path, error):
     block.__enter__().outcomes.update(ROWS)
     assert not block.__exit__(error, error(), None)  # which is not swallowed
     assert len(ResultsStore(WORDS, tmp_path, REPLICATES).outcomes) == len(ROWS)
-
-
-def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path):
-    file = filled(tmp_path)
-    before = file.read_bytes()
-    store = ResultsStore(WORDS, tmp_path, REPLICATES)
-    store.outcomes[5] = Outcome({}, {}, object())  # which JSON cannot hold
-    with pytest.raises(TypeError):
-        store.write()
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {LEDGER: before}
-
-
-def test_what_a_killed_run_left_behind_is_removed(tmp_path):
-    """Only that: files that others put there stay."""
-    filled(tmp_path)
-    half = tmp_path / f".tactile-bayes-{files._HOST}-0123456789abcdef.tmp"
-    half.mkdir()
-    (half / LEDGER).write_text('{"format": 1, "exper')
-    (tmp_path / "notes.json").write_text("{}")
-    with open_results_store(WORDS, tmp_path, REPLICATES) as store:
-        assert len(store.outcomes) == len(ROWS)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.json", LEDGER]
 
 
 def test_one_run_at_a_time(tmp_path):
@@ -162,39 +115,38 @@ def test_of_another_experiment_without_replicates_nothing_is_lost(tmp_path):
     assert ResultsStore(WORDS, tmp_path, REPLICATES).outcomes
 
 
-GARBAGE = {
-    "empty": b"",
-    "cut off": b'{"format": 1, "experiment": {"family": "par',
-    "no text": b"\x89HDF\r\n\xff\xfe",
-    "null": b"null",
-    "a list": b"[]",
-    "nothing in it": b"{}",
-    "no rows": b'{"format": 1, "experiment": {}}',
-    "rows that are none": b'{"format": 1, "experiment": {}, "replicates": 5}',
-    "words that are none": b'{"format": 1, "experiment": 5, "replicates": []}',
-    "an empty row": b'{"format": 1, "experiment": {}, "replicates": [{}]}',
-    "a rank that is none": b'{"format": 1, "experiment": {}, "replicates": '
-    b'[{"number": 0, "ranks": {"a": null}, "numbers": {}, "message": ""}]}',
-    "ranks that are none": b'{"format": 1, "experiment": {}, "replicates": '
-    b'[{"number": 0, "ranks": [1], "numbers": {}, "message": ""}]}',
-    "a number that is none": b'{"format": 1, "experiment": {}, "replicates": '
-    b'[{"number": 0, "ranks": {}, "numbers": {"seconds": "long"}, "message": ""}]}',
-}
+def row(**changes):
+    """A file of one row that has something else in one place."""
+    whole = {"number": 0, "ranks": {}, "numbers": {}, "message": ""} | changes
+    return json.dumps({"format": 1, "experiment": {}, "replicates": [whole]}).encode()
 
 
-@pytest.mark.parametrize("content", GARBAGE.values(), ids=GARBAGE)
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b'{"format": 1, "experiment": {"family": "par',
+        b"\x89HDF\r\n\xff\xfe",
+        b"null",
+        b"[]",
+        b"{}",
+        b'{"format": 1, "experiment": {}}',
+        b'{"format": 1, "experiment": {}, "replicates": 5}',
+        b'{"format": 1, "experiment": 5, "replicates": []}',
+        b'{"format": 1, "experiment": {}, "replicates": [{}]}',
+        row(ranks={"a": None}),
+        row(ranks=[1]),
+        row(numbers={"seconds": "long"}),
+    ],
+)
 def test_garbage_is_refused_with_path_and_correction(tmp_path, content):
     (tmp_path / LEDGER).write_bytes(content)
     left_alone(tmp_path, tmp_path / LEDGER, "read")
 
 
-def test_another_format_is_refused(tmp_path):
+def test_another_format_and_a_file_in_place_of_the_folder_are_refused(tmp_path):
     file = filled(tmp_path)
     file.write_text(file.read_text(encoding="utf-8").replace('"format": 1', '"format": 2'), encoding="utf-8")
     left_alone(tmp_path, file, "format 2", 1)
-
-
-def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
-    (tmp_path / "taken").touch()
-    with refused(CalibrationError, tmp_path / "taken"):
-        open_results_store(WORDS, tmp_path / "taken", REPLICATES).__enter__()
+    with refused(CalibrationError, file):
+        open_results_store(WORDS, file, REPLICATES).__enter__()

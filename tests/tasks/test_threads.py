@@ -28,20 +28,12 @@ def seen(count, fewest):
     return times, len(threads), any(thread is not threading.current_thread() for thread in threads)
 
 
-@pytest.mark.parametrize("count", [20, 21, 100])
-def test_parts_are_all_items_once(count):
+@pytest.mark.parametrize("count", [0, 1, 19, 20, 21, 100])
+def test_parts_are_all_items_once_and_few_items_are_one_part_on_this_thread(count):
     times, parts, elsewhere = seen(count, 10)
     np.testing.assert_array_equal(times, 1)
-    assert parts > 1
-    assert elsewhere
-
-
-@pytest.mark.parametrize("count", [0, 1, 19])
-def test_few_items_are_one_part_on_this_thread(count):
-    times, parts, elsewhere = seen(count, 10)
-    np.testing.assert_array_equal(times, 1)
-    assert parts == 1
-    assert not elsewhere
+    assert (parts > 1, elsewhere) == (count >= 20, count >= 20)
+    assert parts >= 1
 
 
 def test_one_thread_is_of_its_context_and_of_its_thread():

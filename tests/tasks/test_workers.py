@@ -20,40 +20,11 @@ TESTS = Path(__file__).resolve().parents[1]
 on_linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
 
 
-def script(text, *arguments, **options):
-    """A Python process that runs a text."""
-    return subprocess.Popen(
-        [sys.executable, "-c", text, *map(str, arguments)],
-        cwd=TESTS,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        **options,
-    )
-
-
-def group_lives(group):
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
 @pytest.mark.parametrize("workers", [1, 2, 4])
 def test_every_task_is_done_once(workers):
     tasks = list(range(7))
     assert sorted(run_tasks(double, tasks, workers=workers)) == [(task, 2 * task) for task in tasks]
-
-
-def test_no_task_is_no_work():
-    assert list(run_tasks(double, [])) == []
-
-
-@pytest.mark.parametrize("workers", [0, -1, 1.5, "2", True])
-def test_no_number_of_workers_is_refused(workers):
-    with refused(ParameterError, "workers", shown(workers)):
-        list(run_tasks(double, [1], workers=workers))
+    assert list(run_tasks(double, [], workers=workers)) == []
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -70,14 +41,10 @@ def test_what_cannot_travel_is_told_in_words():
 
 
 @on_linux
-def test_the_task_of_a_killed_process_is_done_again(tmp_path):
+def test_the_task_of_a_killed_process_is_done_again_unless_it_always_kills(tmp_path):
     tasks = [(str(tmp_path), number) for number in range(6)]
     assert sorted(result for _, result in run_tasks(die_once, tasks, workers=2)) == list(range(6))
     assert (tmp_path / "died").exists()
-
-
-@on_linux
-def test_a_task_that_always_kills_is_given_up():
     with refused(TaskError, "4 times", "task 1"):
         list(run_tasks(die, [0, 1], workers=2))
 
@@ -95,45 +62,56 @@ SLEEPING = """
 import sys
 from tactile_bayes.tasks import run_tasks
 from helpers.tasks import note_and_sleep
+print("now", flush=True)
 list(run_tasks(note_and_sleep, [(sys.argv[1], 60.0)] * 2, workers=2))
 """
 
 
-@on_linux
-def test_processes_die_with_their_parent(tmp_path):
-    parent = script(SLEEPING, tmp_path)
-    wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
-    parent.kill()
-    parent.communicate()
-    wait_until(lambda: not any(alive(path.name) for path in tmp_path.iterdir()), seconds=5.0)
+def group_lives(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
-@pytest.mark.slow
 @on_linux
-@pytest.mark.parametrize("begun", [True, False])
-def test_an_interrupt_ends_all_at_once(tmp_path, begun):
-    """From a terminal the whole group hears it; the processes for the work keep silent, even while they start."""
-    text = SLEEPING.replace("list(run", "print('now', flush=True)\nlist(run")
-    parent = script(text, tmp_path, start_new_session=True)
+@pytest.mark.parametrize(
+    "end",
+    [
+        "killed",
+        pytest.param("interrupted", marks=pytest.mark.slow),
+        pytest.param("interrupted as it begins", marks=pytest.mark.slow),
+    ],
+)
+def test_processes_end_with_their_parent(tmp_path, end):
+    """From a terminal the whole group hears an interrupt; the processes for the work keep silent."""
+    command = [sys.executable, "-c", SLEEPING, str(tmp_path)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    parent = subprocess.Popen(command, cwd=TESTS, start_new_session=True, **pipes)
     parent.stdout.readline()
-    if begun:
-        wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
-    else:
+    if end == "interrupted as it begins":
         wait_until(lambda: Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().count(" ") >= 2)
-    os.killpg(parent.pid, signal.SIGINT)
+    else:
+        wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
+    if end == "killed":
+        parent.kill()
+    else:
+        os.killpg(parent.pid, signal.SIGINT)
     _, words = parent.communicate(timeout=10.0)
-    assert words.count("Traceback") == 1, words
-    assert words.rstrip().endswith("KeyboardInterrupt")
-    wait_until(lambda: not group_lives(parent.pid), seconds=5.0)
+    wait_until(lambda: not any(alive(path.name) for path in tmp_path.iterdir()), seconds=5.0)
+    if end != "killed":
+        assert words.count("Traceback") == 1, words
+        assert words.rstrip().endswith("KeyboardInterrupt")
+        wait_until(lambda: not group_lives(parent.pid), seconds=5.0)
 
 
-@pytest.mark.parametrize("address", ["nonsense", "foo://1", "tcp://x:y", "http://localhost:8786", ""])
-def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address, monkeypatch):
+@pytest.mark.parametrize("workers", [0, -1, 1.5, "2", True, "nonsense", "foo://1", "tcp://x:y", "http://a:8786", ""])
+def test_what_is_no_number_or_address_is_refused_at_once(workers, monkeypatch):
     """Before there is a client, whose destructor would fail."""
-    distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(distributed, "Client", None)
-    with refused(ParameterError, f"'{address}'", "tcp:"):
-        list(run_tasks(double, [1, 2], workers=address))
+    monkeypatch.setattr(pytest.importorskip("distributed"), "Client", None)
+    with refused(ParameterError, "tcp:" if isinstance(workers, str) else "workers", shown(workers)):
+        list(run_tasks(double, [1, 2], workers=workers))
 
 
 def test_a_scheduler_without_dask_is_told_how_to_install_it(monkeypatch):

@@ -81,17 +81,13 @@ def test_one_contour_has_its_triangle_and_no_band():
     np.testing.assert_allclose(found.triangle_upper, Q + A * 0.15**2, rtol=1e-13)  # the vertex is in the middle
 
 
-def test_the_band_lies_between_the_edges_of_the_triangles():
-    """Quantiles are in order because each contour is in its own triangle."""
-    found = gap(spread()[0])
-    assert (found.triangle_lower <= found.band_lower + 1e-12).all()
-    assert (found.triangle_upper >= found.band_upper - 1e-12).all()
-
-
 def test_bands_are_compared_over_the_same_places():
     made, other = spread()[0], spread()[0]
     other["posterior"]["q"] = other["posterior"]["q"] + 3.0 * (other["posterior"]["q"] - Q)
     found = gap(made, 0.9, without_events=other)
+    # Quantiles are in order because each contour is in its own triangle.
+    assert (found.triangle_lower <= found.band_lower + 1e-12).all()
+    assert (found.triangle_upper >= found.band_upper - 1e-12).all()
     assert (found.x[0], found.x[-1]) == (found.left.sel(bound="median"), found.right.sel(bound="median"))
     for name, posterior_ in (("band", made), ("band_without_events", other)):
         band = contour_band(posterior_, found.x.values, 0.9)
@@ -177,13 +173,6 @@ def test_of_an_inferred_contour():
     assert found.status.item() == "ok"
 
 
-@pytest.mark.parametrize("there", BOTH)
-def test_one_direction_leaves_no_gap(there):
-    missing = {"forward": "backward", "backward": "forward"}[there]
-    with refused(InferenceError, missing):
-        gap(tree([[[0.1]]], [there]))
-
-
 def with_events(made, **there):
     """The same with events only in some of the draws, which are said for one segment."""
     events = made["events"].to_dataset()
@@ -211,7 +200,18 @@ def test_draws_without_an_event_do_not_count():
     assert "not touched" in found.status.item()
 
 
-def test_without_any_event_there_are_no_ends():
-    made = with_events(spread()[0], first_contact_x=(np.zeros(500, dtype=bool), 0))
-    with refused(InferenceError, "every sweep"):
+NEVER = np.zeros(500, dtype=bool)
+
+
+@pytest.mark.parametrize(
+    ("made", "named"),
+    [
+        (tree([[[0.1]]], ["forward"]), "backward"),
+        (tree([[[0.1]]], ["backward"]), "forward"),
+        (with_events(spread()[0], first_contact_x=(NEVER, 0)), "every sweep"),
+    ],
+    ids=["no backward sweep", "no forward sweep", "no event"],
+)
+def test_what_leaves_no_gap_is_refused(made, named):
+    with refused(InferenceError, named):
         gap(made)

@@ -8,7 +8,6 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.normal_band import normal_band, normal_offsets
 
 X = np.linspace(-0.4, 0.4, 33)
@@ -53,15 +52,6 @@ def test_the_points_found_are_on_the_contours_and_on_the_normals(family):
     x = locus.x - offsets * np.sin(locus.slope_angle)
     y = locus.y + offsets * np.cos(locus.slope_angle)
     np.testing.assert_allclose(contours.take(np.arange(200)[:, None]).height(x), y, rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("family", ["parabola", "circle", "ellipse"])
-def test_to_first_order_it_is_the_vertical_band_seen_across(family):
-    """Second order: relative to the width, of the order of the deviations themselves."""
-    posterior = spread(family, share=1e-5)
-    vertical, across = contour_band(posterior, X), normal_band(posterior, X)
-    width = (vertical.upper - vertical.lower) * np.cos(across.slope_angle)
-    np.testing.assert_allclose(across.upper - across.lower, width, rtol=1e-3)
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.9])

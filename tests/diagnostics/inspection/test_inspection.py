@@ -10,11 +10,10 @@ from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.inspection import known_cell
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, stuck, uneven_steps
-from tactile_bayes.diagnostics.inspection.stretches import autocorrelation, unloaded_stretches
+from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import rows_of_sweeps
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan
@@ -48,10 +47,8 @@ def coarse():
 def turned(coarse):
     """That record with a wrong sign, inspected: what was found, and the steps that were told."""
     steps = []
-    found = tb.inspect_record(
-        changed(coarse, force_x=-coarse.force_x), progress=lambda done, count: steps.append((done, count))
-    )
-    return found, steps
+    wrong = changed(coarse, force_x=-coarse.force_x)
+    return tb.inspect_record(wrong, progress=lambda done, count: steps.append((done, count))), steps
 
 
 @pytest.fixture(scope="module")
@@ -61,12 +58,9 @@ def swept():
 
 
 def bare(record):
-    record = record.drop_vars([name for name in record.data_vars if name.startswith("truth_")])
-    return (
-        record.assign_attrs({})
-        .drop_attrs(deep=False)
-        .assign_attrs({name: value for name, value in record.attrs.items() if not name.startswith("load_cell_")})
-    )
+    bare = record.drop_vars([name for name in record.data_vars if name.startswith("truth_")])
+    bare.attrs = {name: value for name, value in record.attrs.items() if not name.startswith("load_cell_")}
+    return bare
 
 
 def changed(record, **columns):
@@ -146,17 +140,13 @@ def test_false_alarms_are_as_rare_as_stated():
 # --- What is wrong ----------------------------------------------------------------------------------------------------
 
 
-def correction_in(said):
+def correction(said):
     (finding,) = [finding for finding in said if finding.kind == "no fit"]
     return finding.details["advice"].removeprefix("nearly all would if ") + "."
 
 
-def correction(record):
-    return correction_in(words(record))
-
-
 def test_a_wrong_sign_is_named(turned):
-    assert correction_in(turned[0].messages) == OTHER_FORCE_X
+    assert correction(turned[0].messages) == OTHER_FORCE_X
 
 
 def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
@@ -172,18 +162,18 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
     measured = cell.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.5 * COARSE).record, rng=1)
     assert (np.abs(measured.force_y.values) == 0.12).any()
     stated = measured.assign_attrs(load_cell_gain_force_x_force_x=0.2, load_cell_gain_force_x_force_y=-0.01)
-    assert correction(stated) == OTHER_FORCE_X
+    assert correction(words(stated)) == OTHER_FORCE_X
 
 
 @pytest.mark.slow
 def test_a_wrong_frame_an_exchange_and_a_sign_that_is_suspected_are_named(record):
     exchanged = changed(record, force_x=record.force_y, force_y=record.force_x)
-    assert correction(exchanged) == "force_x and force_y were exchanged."
+    assert correction(words(exchanged)) == "force_x and force_y were exchanged."
     as_fixed = tb.record.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
-    assert 'the load cell turned with the drive (frame = "turning" under [load_cell]' in correction(as_fixed)
-    upside_down = changed(record, force_y=-record.force_y)
-    assert correction(upside_down).startswith("force_y had the other sign")
-    assert words(upside_down)[0].kind == "force sign"
+    assert 'the load cell turned with the drive (frame = "turning" under [load_cell]' in correction(words(as_fixed))
+    first, *others = words(changed(record, force_y=-record.force_y))
+    assert first.kind == "force sign"
+    assert correction(others).startswith("force_y had the other sign")
 
 
 def counted_otherwise(record, sense, turns, moment=1):
@@ -231,18 +221,14 @@ def test_a_world_in_which_all_fits_but_lies_below_the_pivot_is_told(coarse):
 def test_friction_is_named():
     dragged = tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3}), drive_step=COARSE).record
     measured = LOAD_CELL.measure(dragged, rng=1)
-    assert correction(measured).startswith("there were friction of about 0.3")
+    assert correction(words(measured)).startswith("there were friction of about 0.3")
     assert words(measured, friction=0.3) == NOTHING
 
 
-def test_wrong_units_come_first(coarse):
+def test_wrong_units_come_first_and_a_wrong_rod_is_told_with_what_to_check(coarse):
     first, *_ = words(changed(coarse, force_x=1e3 * coarse.force_x, force_y=1e3 * coarse.force_y))
     assert (first.kind, first.details["largest"]) == ("large loads", "1.13e+04")
-
-
-def test_a_wrong_rod_is_told_with_what_to_check(coarse):
-    stiffer = coarse.assign_attrs(rod_flexural_rigidity=1.2 * ROD.flexural_rigidity)
-    first, *_ = words(stiffer)
+    first, *_ = words(coarse.assign_attrs(rod_flexural_rigidity=1.2 * ROD.flexural_rigidity))
     assert (first.kind, first.details["advice"]) == ("no fit", CHECK_RIG)
 
 
@@ -258,24 +244,15 @@ def test_readings_that_stand_out_in_contact_and_out_of_it(record):
     assert "that is stated allows for some" in sentence.details["advice"]
 
 
-def test_readings_that_are_stuck(record):
+def test_readings_that_are_stuck_or_stored_twice(record):
     found = tb.inspect_record(put(record, "force_y", slice(60, 72), record.force_y[60]))
     assert np.flatnonzero(found.samples.stuck.sel(channel="force_y")).tolist() == list(range(60, 72))
-    stuck_, *_ = found.messages
-    assert (stuck_.kind, stuck_.details["channel"], stuck_.details["samples"]) == (
-        "stuck",
-        "force_y",
-        "samples 60 to 71",
-    )
-    assert stuck_.details["readings"] == "12 readings"
-
-
-def test_samples_that_are_stored_twice(record):
-    again = record.isel(sample=np.sort(np.append(np.arange(record.sizes["sample"]), 30)))
-    found = tb.inspect_record(again)
+    first, details = found.messages[0], found.messages[0].details
+    assert (first.kind, details["channel"], details["samples"]) == ("stuck", "force_y", "samples 60 to 71")
+    assert details["readings"] == "12 readings"
+    found = tb.inspect_record(record.isel(sample=np.sort(np.append(np.arange(record.sizes["sample"]), 30))))
     assert np.flatnonzero(found.samples.repeated).tolist() == [31]
-    assert found.messages[0].kind == "stored twice"
-    assert found.messages[0].details["samples"] == "sample 31"
+    assert (found.messages[0].kind, found.messages[0].details["samples"]) == ("stored twice", "sample 31")
 
 
 @pytest.mark.parametrize("stated", [False, True])
@@ -298,14 +275,11 @@ def test_a_channel_that_never_changes(record):
 
 def test_a_record_or_a_sweep_without_contact(record):
     rng = np.random.default_rng(1)
-    noise = {name: 3e-3 * rng.standard_normal(record.sizes["sample"]) for name in ("force_x", "force_y")}
-    moment = 2.5e-4 * rng.standard_normal(record.sizes["sample"])
-    silent = changed(record, holding_moment=moment, **noise)
+    noise = LOAD_CELL.standard_deviations
+    silent = changed(record, **{n: sd * rng.standard_normal(record.sizes["sample"]) for n, sd in noise.items()})
     (sentence,) = words(silent)
     assert sentence.kind == "no contact"
-    of_second = record.sweep.values == 1
-    half = {name: np.where(of_second, silent[name], record[name]) for name in ("holding_moment", *noise)}
-    (sentence,) = words(changed(record, **half))
+    (sentence,) = words(changed(record, **{n: silent[n].where(record.sweep == 1, record[n]) for n in noise}))
     assert (sentence.kind, sentence.details["sweeps"]) == ("sweep without contact", "Sweep 1 shows")
 
 
@@ -355,7 +329,7 @@ def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
     assert angle.startswith('"90-Motor[deg]"')
 
 
-def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
+def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal, record):
     cell = tb.LoadCell(
         force_noise=1e-3, moment_noise=2.5e-4, drift=tb.load_cell.OrnsteinUhlenbeck(force=6e-3, time=5.0)
     )
@@ -368,12 +342,8 @@ def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
     first, *_ = words(stated)
     assert first.kind == "noise not as stated"
     assert first.details == {"channel": "force_x", "found": "2.91 mN", "stated": "1 mN"}
-
-
-def test_noise_without_a_standard_deviation_is_not_compared(record):
-    found = tb.inspect_record(
-        record, rig=Rig(load_cell=tb.LoadCell(force_noise=3e-3, moment_noise=2.5e-4, degrees_of_freedom=2.0))
-    )
+    without_deviation = tb.LoadCell(force_noise=3e-3, moment_noise=2.5e-4, degrees_of_freedom=2.0)
+    found = tb.inspect_record(record, rig=Rig(load_cell=without_deviation))
     assert np.isnan(found.channels.stated_noise.values).all()
     assert found.messages == NOTHING
 
@@ -417,12 +387,6 @@ def test_the_load_cell_is_known_from_what_is_nearest(ideal, record):
     assert known_cell(record)[1] == "unloaded samples"
     assert known_cell(ideal) == (None, "nothing")
     assert known_cell(record.isel(sample=slice(40, 42))) == (None, "too few unloaded samples")
-
-
-def test_stretches_are_unloaded_and_of_one_sweep():
-    sweeps = rows_of_sweeps(np.array([0, 0, 0, 1, 1, 1]))
-    stretches = unloaded_stretches(sweeps, np.array([True, False, True, True, True, False]))
-    assert [rows.tolist() for rows in stretches] == [[0], [2], [3, 4]]
 
 
 def test_autocorrelation_of_a_process_that_is_known():

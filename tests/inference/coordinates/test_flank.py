@@ -43,13 +43,6 @@ def points_of(family, side, count=50):
 
 
 @FLANKS
-def test_coordinates_of_points_lead_back_to_them(family, side):
-    points = points_of(family, side)
-    there, _ = flank(family, side).parameters(flank(family, side).of(points))
-    np.testing.assert_allclose(there, points, rtol=1e-9, atol=1e-11)
-
-
-@FLANKS
 def test_they_are_slope_shape_height_and_slope_ratio_at_the_place(family, side):
     """The contour's own slope and curvature, from its class, at the place."""
     points = points_of(family, side)
@@ -61,20 +54,19 @@ def test_they_are_slope_shape_height_and_slope_ratio_at_the_place(family, side):
         assert np.sign(slope) == side
         bend = (1.0 + slope**2) ** 1.5 / contour.radius_of_curvature(slope_angle)
         # Of an ellipse, with the circle of which it is a shadow.
-        shape = []
-        if family == "power-law":
-            shape = [point[1] - 1.0]
-        elif family == "ellipse":
-            shape = [np.tan(np.arcsin(abs(PLACE - point[-2]) / point[0]))]
+        shadow = np.tan(np.arcsin(abs(PLACE - point[-2]) / point[0])) if family == "ellipse" else None
+        shape = {"power-law": [point[1] - 1.0], "ellipse": [shadow]}.get(family, [])
         expected = [*np.log([abs(slope), *shape]), height, np.log(abs(slope) / bend), np.log(point[-1])]
         np.testing.assert_allclose(row, expected, rtol=1e-9, atol=1e-12)
 
 
 @FLANKS
-def test_volumes_grow_as_the_determinant_of_the_jacobian_says(family, side):
+def test_they_lead_back_and_volumes_grow_as_the_determinant_of_the_jacobian_says(family, side):
     """By differences of third order, whose errors are a millionth."""
-    coordinates = flank(family, side)
-    for place in coordinates.of(points_of(family, side, 10)):
+    coordinates, points = flank(family, side), points_of(family, side)
+    there = coordinates.of(points)
+    np.testing.assert_allclose(coordinates.parameters(there)[0], points, rtol=1e-9, atol=1e-11)
+    for place in there[:10]:
         steps = 1e-4 * np.eye(place.size)
         ends = [coordinates.parameters(place + k * steps)[0] for k in (-2, -1, 1, 2)]
         jacobian = (ends[0] - 8.0 * ends[1] + 8.0 * ends[2] - ends[3]) / 12e-4

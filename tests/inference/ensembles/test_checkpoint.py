@@ -7,7 +7,6 @@ import sys
 import time
 from dataclasses import replace
 from functools import cache
-from importlib.metadata import version
 from itertools import pairwise
 
 import numpy as np
@@ -15,8 +14,7 @@ import pytest
 
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, checkpoint, run_state, sample
-from tactile_bayes.tasks import files
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, checkpoint, sample
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
 STEADY = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=4000, min_ess=200, max_r_hat=1.05)
@@ -92,12 +90,7 @@ def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.slow
-def test_a_checkpoint_does_not_change_the_draws(tmp_path):
-    assert_same(draw(tmp_path / "made" / "on the way", settings=STEADY), draw(settings=STEADY))
-
-
-@pytest.mark.parametrize("calls", [1, 25, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 50, 97))])
+@pytest.mark.parametrize("calls", [1, 25, pytest.param(97, marks=pytest.mark.slow)])
 def test_a_run_goes_on_bit_by_bit_wherever_it_was_killed(tmp_path, calls):
     with pytest.raises(Killed):
         draw(tmp_path, target=Counted(killed_at=calls))
@@ -108,88 +101,34 @@ def test_a_run_goes_on_bit_by_bit_wherever_it_was_killed(tmp_path, calls):
     assert target.calls == 2 * (SMALL.max_steps - made) + (0 if made else 2)
 
 
-@pytest.mark.slow
-def test_a_run_goes_on_to_convergence_after_many_kills(tmp_path):
-    """One that is killed after every three blocks or so judges at the same steps and ends where it would have ended."""
-    kills = 0
-    while True:
-        try:
-            again = draw(tmp_path, settings=STEADY, target=Counted(killed_at=130))
-            break
-        except Killed:
-            kills += 1
-    assert kills > 2
-    steady = draw(settings=STEADY)
-    assert steady.converged
-    assert_same(again, steady)
-
-
-@pytest.mark.parametrize("moment", ["before the file", "before the rename", "after the rename"])
-def test_a_run_goes_on_when_killed_while_its_state_is_written(tmp_path, monkeypatch, moment):
-    written = 0
-
-    def write(path, state, seconds):
-        nonlocal written
-        written += 1
-        if written < 3:
-            return made(path, state, seconds)
-        if moment == "before the rename":
-            half = tmp_path / f".tactile-bayes-{files._HOST}-0123456789abcdef.tmp"
-            half.mkdir()
-            (half / "checkpoint.npz").write_bytes(b"PK half of a file")
-        if moment == "after the rename":
-            made(path, state, seconds)
-        raise Killed
-
-    made = checkpoint.Checkpoint.write
-    with monkeypatch.context() as patched:
-        patched.setattr(checkpoint.Checkpoint, "write", write)
-        with pytest.raises(Killed):
-            draw(tmp_path)
-    assert_same(draw(tmp_path), whole())
-    assert not list(tmp_path.glob(".*"))
-
-
+# A process that samples as `draw` does, and waits amid the second block.
 CHILD = """
 import sys, time
 import numpy as np
 from tactile_bayes.inference.ensembles import SamplerSettings, checkpoint, sample
 
 checkpoint._SECONDS = 0.0
-folder, pause, pauses_after = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
 calls = 0
 
 def target(x):
     global calls
     calls += 1
-    if calls > pauses_after:
-        time.sleep(pause)
+    if calls > 30:
+        time.sleep(600.0)
     return -0.5 * (x[:, 0] ** 2 + (x[:, 1] - np.abs(x[:, 0])) ** 2)
 
 settings = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
 start = 2.0 * np.random.default_rng(0).normal(size=(2, 8, 2))
-print("begun", flush=True)
-sample(target, start, names=["a", "b"], seed=3, settings=settings, checkpoint=folder)
+sample(target, start, names=["a", "b"], seed=3, settings=settings, checkpoint=sys.argv[1])
 """
 
-no_signals = pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 
-
-def child(folder, pause, pauses_after):
-    """A process that samples as `draw` does, once it has begun."""
-    command = [sys.executable, "-c", CHILD, str(folder), str(pause), str(pauses_after)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE)
-    assert process.stdout is not None
-    assert process.stdout.readline()
-    return process
-
-
-@no_signals
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 @pytest.mark.slow
 def test_a_process_that_is_killed_leaves_a_whole_state(tmp_path):
     """SIGKILL amid the second block; as long as the process is there, no other run gets in."""
     folder = tmp_path / "run"
-    with child(folder, 600.0, 30) as process:
+    with subprocess.Popen([sys.executable, "-c", CHILD, str(folder)]) as process:
         while not (folder / "checkpoint.npz").exists():
             assert process.poll() is None
             time.sleep(1e-2)
@@ -201,38 +140,26 @@ def test_a_process_that_is_killed_leaves_a_whole_state(tmp_path):
     assert_same(draw(folder), whole())
 
 
-@no_signals
 @pytest.mark.slow
-def test_processes_that_are_killed_at_random_moments_end_as_one_that_is_not(tmp_path):
-    folder, rng, kills = tmp_path / "run", np.random.default_rng(1), 0
-    while kills < 10 and steps_in(folder) < 60:
-        with child(folder, 4e-3, 0) as process:
-            time.sleep(rng.uniform(0.0, 0.5))
-            process.kill()
-        kills += process.returncode == -signal.SIGKILL
-    assert kills
-    assert_same(draw(folder), whole())
-
-
-@pytest.mark.slow
-def test_a_run_that_has_ended_is_not_made_again(tmp_path):
-    first = draw(tmp_path, settings=STEADY)
+def test_a_run_that_has_ended_is_made_longer_only_by_stricter_settings(tmp_path):
+    first, before = draw(tmp_path, settings=STEADY), content(tmp_path)
     assert first.converged
-    before = content(tmp_path)
-    target = Counted()
-    seen = []
+    target, seen = Counted(), []
     assert_same(draw(tmp_path, settings=STEADY, target=target, progress=seen.append), first)
     assert target.calls == 0
     assert [state.steps for state in seen] == [first.steps_run]
     assert content(tmp_path) == before
+    assert_same(draw(tmp_path, settings=replace(STEADY, min_ess=100)), first)
+    strict = replace(STEADY, min_ess=1.5 * float(first.ess_tail.min()))
+    longer = draw(tmp_path, settings=strict)
+    assert longer.steps_run > first.steps_run
+    assert_same(longer, draw(settings=strict))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("steps", [30, 35, 57])
+@pytest.mark.parametrize("steps", [30, pytest.param(35, marks=pytest.mark.slow)])
 def test_a_run_out_of_steps_goes_on_with_more_of_them(tmp_path, steps):
-    few = replace(SMALL, max_steps=steps)
-    assert_same(draw(tmp_path, settings=few), draw(settings=few))
-    target = Counted()
+    few, target = replace(SMALL, max_steps=steps), Counted()
+    draw(tmp_path, settings=few)
     assert_same(draw(tmp_path, settings=few, target=target), draw(settings=few))
     assert target.calls == 0
     assert_same(draw(tmp_path), whole())
@@ -265,40 +192,14 @@ def test_a_run_that_ended_between_two_looks_is_judged_there_again(tmp_path):
     assert draw(tmp_path, settings=loose).steps_run == 125
 
 
-@pytest.mark.slow
-def test_stricter_settings_go_on_and_looser_ones_do_not(tmp_path):
-    first = draw(tmp_path, settings=STEADY)
-    assert_same(draw(tmp_path, settings=replace(STEADY, min_ess=100)), first)
-    strict = replace(STEADY, min_ess=1.5 * float(first.ess_tail.min()))
-    longer = draw(tmp_path, settings=strict)
-    assert longer.steps_run > first.steps_run
-    assert_same(longer, draw(settings=strict))
-
-
-def test_an_interrupt_keeps_the_whole_blocks(tmp_path):
+def test_an_interrupt_keeps_the_whole_blocks_and_gives_what_is_there(tmp_path):
     draws = draw(tmp_path, target=Counted(killed_at=2 + 2 * 24, error=KeyboardInterrupt))
     assert "interrupted" in draws.message
     assert 20 < draws.steps_run < 30
     assert steps_in(tmp_path) == 20
-    assert_same(draw(tmp_path), whole())
-
-
-def test_an_interrupt_before_the_next_block_gives_what_is_there(tmp_path):
-    few = draw(tmp_path, settings=replace(SMALL, max_steps=20))
     draws = draw(tmp_path, target=Counted(killed_at=1, error=KeyboardInterrupt))
     assert "interrupted" in draws.message
-    np.testing.assert_array_equal(draws.samples, few.samples)
-
-
-def test_an_interrupt_while_a_state_is_written_gives_what_is_in_memory(tmp_path, monkeypatch):
-    def interrupted(path):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patched:
-        patched.setattr(checkpoint, "write_atomically", interrupted)
-        draws = draw(tmp_path)
-    assert "interrupted" in draws.message
-    assert draws.steps_run == 10
+    np.testing.assert_array_equal(draws.samples, draw(settings=replace(SMALL, max_steps=20)).samples)
     assert_same(draw(tmp_path), whole())
 
 
@@ -311,20 +212,6 @@ def test_a_checkpoint_is_written_at_the_end_and_every_few_seconds(tmp_path, monk
     assert steps_in(tmp_path) == 60
 
 
-def test_a_checkpoint_has_the_second_half_of_the_steps_and_the_states_of_emcee(tmp_path):
-    draw(tmp_path, settings=replace(SMALL, max_steps=10))
-    with np.load(tmp_path / "checkpoint.npz", allow_pickle=False) as arrays:
-        assert arrays["samples"].shape == (2, 5, 8, 2)
-        assert arrays["places"].shape == (2, 8, 2)
-        assert all(arrays[name].dtype != object for name in arrays)
-    description = stated(tmp_path)
-    assert [(state[0], len(state[1])) for state in description["random_states"]] == 2 * [("MT19937", 624)]
-    assert description["identity"]["version of emcee"] == version("emcee")
-
-
-# --- Refusals, which leave everything as it was -----------------------------------------------------------------------
-
-
 def refuse(folder, *named, **options):
     before = content(folder)
     target = Counted()
@@ -334,39 +221,65 @@ def refuse(folder, *named, **options):
     assert content(folder) == before
 
 
+SAME = {"data": "a" * 64, "model": "parabola"}
+OTHER_SEED = np.random.SeedSequence(3, spawn_key=(1,))
+
+
 @pytest.fixture
 def begun(tmp_path):
-    draw(tmp_path, settings=replace(SMALL, max_steps=30), identity={"data": "a" * 64, "model": "parabola"})
+    draw(tmp_path, settings=replace(SMALL, max_steps=30), identity=SAME)
     return tmp_path
 
 
-def test_another_run_is_refused_with_what_differs(begun):
-    same = {"data": "a" * 64, "model": "parabola"}
-    refuse(begun, "model (was 'parabola', now 'circle')", identity={**same, "model": "circle"})
-    refuse(begun, "data", "now not stated", identity={"model": "parabola"})
-    refuse(begun, "rod (was not stated, now '1')", identity={**same, "rod": "1"})
-    refuse(begun, "seed of the ensembles (was '3, pool of 4', now '4, pool of 4')", identity=same, seed=4)
-    child = np.random.SeedSequence(3, spawn_key=(1,))
-    refuse(begun, "now '3, spawn key (1,), pool of 4'", identity=same, seed=child)
-    refuse(begun, "names of parameters (was 'a, b', now 'a, c')", identity=same, names=("a", "c"))
-    refuse(begun, "starting points", identity=same, scale=3.0)
-    refuse(begun, "block_steps", identity=same, settings=replace(SMALL, block_steps=20))
-    refuse(begun, "walkers of an ensemble (was '8', now '10')", identity=same, settings=replace(SMALL, walkers=10))
-    refuse(begun, "number of ensembles (was '2', now '3')", identity=same, settings=replace(SMALL, ensembles=3))
-    draw(begun, identity=same, seed=np.random.SeedSequence(3))
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"identity": {**SAME, "model": "circle"}}, ["model (was 'parabola', now 'circle')"]),
+        ({"identity": {"model": "parabola"}}, ["data", "now not stated"]),
+        ({"identity": {**SAME, "rod": "1"}}, ["rod (was not stated, now '1')"]),
+        ({"seed": 4}, ["seed of the ensembles (was '3, pool of 4', now '4, pool of 4')"]),
+        ({"seed": OTHER_SEED}, ["now '3, spawn key (1,), pool of 4'"]),
+        ({"names": ("a", "c")}, ["names of parameters (was 'a, b', now 'a, c')"]),
+        ({"scale": 3.0}, ["starting points"]),
+        ({"settings": replace(SMALL, block_steps=20)}, ["block_steps"]),
+        ({"settings": replace(SMALL, walkers=10)}, ["walkers of an ensemble (was '8', now '10')"]),
+        ({"settings": replace(SMALL, ensembles=3)}, ["number of ensembles (was '2', now '3')"]),
+    ],
+)
+def test_another_run_is_refused_with_what_differs(begun, change, named):
+    refuse(begun, *named, **{"identity": SAME} | change)
+
+
+def test_an_integer_and_its_sequence_are_one_seed(begun):
+    assert draw(begun, identity=SAME, seed=np.random.SeedSequence(3)).steps_run == 60
 
 
 def test_a_long_entry_is_shown_where_it_differs(tmp_path):
-    few = replace(SMALL, max_steps=10)
     priors = "; ".join(f"parameter {i} uniform" for i in range(20))
-    draw(tmp_path, settings=few, identity={"priors": priors})
-    changed = priors.replace("11 uniform", "11 normal")
-    refuse(tmp_path, "11 uniform", "11 normal", "…", settings=few, identity={"priors": changed})
+    draw(tmp_path, settings=replace(SMALL, max_steps=10), identity={"priors": priors})
+    refuse(tmp_path, "11 uniform", "11 normal", "…", identity={"priors": priors.replace("11 uniform", "11 normal")})
 
 
-def test_another_version_of_emcee_is_refused(begun, monkeypatch):
-    stated(begun, identity=stated(begun)["identity"] | {"version of emcee": "3.1.5"})
-    refuse(begun, "version of emcee (was '3.1.5'", identity={"data": "a" * 64, "model": "parabola"})
+ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 2, "steps": 0}
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"text": " "}, "damaged"),
+        ({"text": "[]"}, "damaged"),
+        ({"text": '{"step": 3}'}, "damaged"),
+        ({"text": '{"kind": "weights", "format": 1}'}, "'weights'"),
+        ({"text": json.dumps(ENSEMBLES | {"format": 3})}, "format 3"),
+        ({"text": json.dumps(ENSEMBLES | {"identity": []})}, "damaged"),
+        ({"text": json.dumps(ENSEMBLES | {"identity": {}})}, "was not stated"),
+        ({"identity": SAME | {"version of emcee": "3.1.5"}}, "version of emcee (was '3.1.5'"),
+        ({"steps": 33}, "after 15 steps"),
+    ],
+)
+def test_a_description_that_is_none_or_of_another_state_is_refused(begun, changed, named):
+    stated(begun, **changed)
+    refuse(begun, named, identity=SAME)
 
 
 def test_a_folder_of_other_things_is_refused(tmp_path):
@@ -378,23 +291,6 @@ def test_a_file_is_refused(tmp_path):
     (tmp_path / "run").write_bytes(b"")
     with refused(InferenceError, tmp_path / "run"):
         draw(tmp_path / "run")
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        (" ", "damaged"),
-        ("[]", "damaged"),
-        ('{"step": 3}', "damaged"),
-        ('{"kind": "weights", "format": 1}', "'weights'"),
-        ('{"kind": "ensembles of tactile-bayes", "format": 3, "more": 1}', "format 3"),
-        ('{"kind": "ensembles of tactile-bayes", "format": 2, "steps": 0, "identity": []}', "damaged"),
-        ('{"kind": "ensembles of tactile-bayes", "format": 2, "steps": 0, "identity": {}}', "was not stated"),
-    ],
-)
-def test_a_description_that_is_none_is_refused(begun, text, named):
-    stated(begun, text=text)
-    refuse(begun, named)
 
 
 def test_a_damaged_file_is_refused_or_as_it_was(tmp_path):
@@ -419,11 +315,6 @@ def test_a_damaged_file_is_refused_or_as_it_was(tmp_path):
     assert refused > 65
 
 
-def test_a_state_of_other_steps_is_refused(begun):
-    stated(begun, steps=33)
-    refuse(begun, "after 15 steps", identity={"data": "a" * 64, "model": "parabola"})
-
-
 def test_one_folder_is_for_one_run_at_a_time(tmp_path):
     def other(_):
         with refused(InferenceError, "another run"):
@@ -432,14 +323,6 @@ def test_one_folder_is_for_one_run_at_a_time(tmp_path):
 
     assert draw(tmp_path, progress=other).steps_run == 10
     assert draw(tmp_path).steps_run == 60
-
-
-@pytest.mark.slow
-def test_where_there_are_no_locks_two_runs_end_as_one(tmp_path, monkeypatch):
-    """Both have the same draws, so that it does not matter whose state is stored."""
-    monkeypatch.setitem(sys.modules, "fcntl", None)
-    assert_same(draw(tmp_path, progress=lambda _: draw(tmp_path)), whole())
-    assert_same(draw(tmp_path), whole())
 
 
 def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
@@ -453,12 +336,3 @@ def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
         with pytest.raises(OSError, match="No space left"):
             draw(tmp_path)
     assert_same(draw(tmp_path), whole())
-
-
-def test_looks_do_not_depend_on_where_a_run_began():
-    looks = [run_state.next_diagnosis(0, 50)]
-    while looks[-1] < 20_000:
-        looks.append(run_state.next_diagnosis(looks[-1], 50))
-    assert looks[:7] == [50, 100, 150, 200, 250, 313, 392]
-    for before, look in pairwise(looks):
-        assert {run_state.next_diagnosis(steps, 50) for steps in (before, before + 1, look - 1)} == {look}

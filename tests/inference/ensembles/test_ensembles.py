@@ -15,15 +15,6 @@ from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time, wa
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=40)
 
 
-def gaussian(mean, covariance):
-    precision = np.linalg.inv(covariance)
-
-    def log_probability(x):
-        return -0.5 * np.einsum("ni,ij,nj->n", x - mean, precision, x - mean)
-
-    return log_probability
-
-
 def standard(x):
     return -0.5 * (x**2).sum(axis=-1)
 
@@ -38,26 +29,6 @@ def draw_from(log_probability, parameters, *, settings=None, seed=1, scale=2.0, 
     start = normal_start(parameters, settings, scale=scale)
     names = [f"x{i}" for i in range(parameters)]
     return sample(log_probability, start, names=names, seed=seed, settings=settings, **options)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scale", [1e-3, 1e3])
-@pytest.mark.parametrize("parameters", [2, 5])
-def test_mean_and_sd_of_a_gaussian(parameters, scale):
-    """Mean within 4 standard errors sd/√ESS, variance within 4 · var · √(2/ESS): false alarm 6e-5 a number.
-
-    The squares mix no slower than the values, so the ESS of the values bounds the error of the variance.
-    """
-    rng = np.random.default_rng(parameters)
-    root = rng.normal(size=(parameters, parameters)) + 2.0 * np.eye(parameters)
-    covariance, mean = scale**2 * (root @ root.T), scale * rng.normal(size=parameters)
-    draws = draw_from(gaussian(mean, covariance), parameters, scale=3.0 * scale)
-    assert draws.converged, draws.message
-    values = draws.samples.reshape(-1, parameters)
-    sd = np.sqrt(np.diag(covariance))
-    ess = np.minimum(draws.ess_bulk, draws.ess_tail)
-    assert np.all(np.abs(values.mean(axis=0) - mean) < 4.0 * sd / np.sqrt(ess))
-    assert np.all(np.abs((values - mean).var(axis=0) / sd**2 - 1.0) < 4.0 * np.sqrt(2.0 / ess))
 
 
 @pytest.mark.slow
@@ -85,38 +56,30 @@ def test_moments_of_a_truncated_gaussian():
     assert np.all(np.abs(((values - mean) ** 2).mean(axis=0) - sd**2) < 4.0 * np.sqrt((fourth - sd**4) / ess))
 
 
-def _with_a_mode_of_no_weight(count):
-    """Return a log-density and a start of 192 walkers, the first of which cannot leave a mode of weight e⁻⁵⁰."""
+def with_lost_walkers(count, **options) -> Draws:
+    """Draws from 192 walkers, the first of which cannot leave a mode of weight e⁻⁵⁰."""
 
     def log_probability(x):
         return np.logaddexp(standard(x), standard(x - 1000.0) - 50.0)
 
     start = normal_start(1, SamplerSettings())
     start[0, :count] += 1000.0
-    return log_probability, start
+    return sample(log_probability, start, names=["a"], seed=1, **options)
 
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_lost_walkers_are_taken_back(count):
     """R̂ alone would let them pass; the draws kept are those after they came back."""
-    log_probability, start = _with_a_mode_of_no_weight(count)
-    draws = sample(log_probability, start, names=["a"], seed=1)
+    draws = with_lost_walkers(count)
     assert draws.converged
     assert draws.samples.max() < 10.0
-
-
-def test_walkers_that_stay_lost_are_counted():
-    log_probability, start = _with_a_mode_of_no_weight(1)
-    draws = sample(log_probability, start, names=["a"], seed=1, settings=SamplerSettings(max_steps=20))
-    assert "1 of 192 walkers" in draws.message
+    assert "1 of 192 walkers" in with_lost_walkers(1, settings=SamplerSettings(max_steps=20)).message
 
 
 def test_a_run_that_took_walkers_back_resumes_as_if_uninterrupted(tmp_path):
-    log_probability, start = _with_a_mode_of_no_weight(1)
-    whole = sample(log_probability, start, names=["a"], seed=1, checkpoint=tmp_path / "whole")
+    whole = with_lost_walkers(1, checkpoint=tmp_path / "whole")
     for steps in (25, 60, 6000):
-        settings = SamplerSettings(max_steps=steps)
-        parts = sample(log_probability, start, names=["a"], seed=1, settings=settings, checkpoint=tmp_path / "parts")
+        parts = with_lost_walkers(1, settings=SamplerSettings(max_steps=steps), checkpoint=tmp_path / "parts")
     np.testing.assert_array_equal(parts.samples, whole.samples)
 
 
@@ -131,11 +94,10 @@ def test_same_seed_same_draws():
 
 
 def test_ensembles_are_independent_of_each_other_and_of_numpys_global_state():
-    settings = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=20)
-    start = normal_start(2, settings)
+    start = normal_start(2, SMALL)
     start[1] = start[0]
     before = np.random.get_state()[1].copy()  # noqa: NPY002
-    draws = sample(standard, start, names=["a", "b"], seed=1, settings=settings)
+    draws = sample(standard, start, names=["a", "b"], seed=1, settings=SMALL)
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
     assert not np.array_equal(draws.samples[0], draws.samples[1])
 
@@ -165,22 +127,6 @@ def test_walker_major_layout_gives_the_right_effective_sample_size(rho):
     assert step_major > 0.5 * tau * ess
 
 
-@pytest.mark.slow
-def test_arviz_and_emcee_agree_on_a_real_run():
-    """Over 100 autocorrelation times the two estimates agree within Sokal's error and emcee's bias of a few τ/n."""
-    settings = SamplerSettings(walkers=16, block_steps=2000, max_steps=2000, min_ess=1e9)
-    draws = draw_from(standard, 2, settings=settings)
-    tau = draws.autocorrelation_time
-    count = draws.samples.shape[0] * draws.samples.shape[1]
-    assert draws.by_walker().shape == (4, 16, 1000, 2)
-    np.testing.assert_array_equal(draws.by_walker()[1, 2], draws.samples[1, 2 * 1000 : 3 * 1000])
-    np.testing.assert_allclose(draws.log_probability, standard(draws.samples), rtol=1e-12)
-    error = 4.0 * np.sqrt(2.0 * (10.0 * tau + 1.0) / count) + 5.0 * tau / draws.steps_kept
-    assert np.all(np.abs(draws.ess_bulk * tau / count - 1.0) < error)
-    step_major = draws.by_walker().transpose(0, 2, 1, 3).reshape(4, -1, 2)
-    assert np.all(array_stats.ess(step_major, chain_axis=0, draw_axis=1) > 3.0 * draws.ess_bulk)
-
-
 def test_a_run_out_of_steps_says_so():
     seen: list[Progress] = []
     draws = draw_from(standard, 2, settings=SMALL, progress=seen.append)
@@ -192,6 +138,8 @@ def test_a_run_out_of_steps_says_so():
     assert [p.steps for p in seen] == [20, 40]
     assert all(p.max_steps == 40 and p.r_hat > 0.0 and p.ess > 0.0 and p.seconds >= 0.0 for p in seen)
     assert np.all((draws.acceptance > 0.0) & (draws.acceptance < 1.0))
+    np.testing.assert_allclose(draws.log_probability, standard(draws.samples), rtol=1e-12)
+    np.testing.assert_array_equal(draws.by_walker()[1, 2], draws.samples[1, 2 * 20 : 3 * 20])
 
 
 def test_a_run_out_of_time_says_so():
@@ -199,18 +147,6 @@ def test_a_run_out_of_time_says_so():
     assert not draws.converged
     assert "time" in draws.message
     assert draws.steps_run == 1  # what it was making
-
-
-@pytest.mark.slow
-def test_separated_modes_are_not_declared_converged():
-    def log_probability(x):
-        return np.logaddexp(-0.5 * (x[:, 0] + 50.0) ** 2, -0.5 * (x[:, 0] - 50.0) ** 2)
-
-    settings = SamplerSettings(ensembles=4, walkers=16, block_steps=100, max_steps=300)
-    start = normal_start(1, settings, scale=1.0) + np.array([-50.0, 50.0, 50.0, -50.0])[:, None, None]
-    draws = sample(log_probability, start, names=["x"], seed=1, settings=settings)
-    assert not draws.converged
-    assert draws.r_hat[0] > 1.5
 
 
 def test_a_common_drift_is_not_declared_converged():
@@ -257,31 +193,8 @@ def test_an_interrupt_leaves_what_has_been_drawn(calls):
 
 
 def test_an_interrupt_from_the_progress_callable_leaves_what_has_been_drawn():
-    def stop(_):
-        raise KeyboardInterrupt
-
-    draws = draw_from(standard, 2, settings=SMALL, progress=stop)
+    draws = draw_from(standard, 2, settings=SMALL, progress=interrupted_at(1, lambda state: None))
     assert draws.steps_run == 20
-    assert not draws.converged
-    assert "interrupted" in draws.message
-
-
-@pytest.mark.parametrize("interrupts", [1, 3])
-def test_an_interrupt_of_the_diagnosis_leaves_what_has_been_drawn(interrupts, monkeypatch):
-    """However often it comes."""
-    calls = 0
-
-    def rhat(*arguments, **options):
-        nonlocal calls
-        calls += 1
-        if calls <= interrupts:
-            raise KeyboardInterrupt
-        return np.array([1.0, 1.0])
-
-    monkeypatch.setattr(diagnosis.array_stats, "rhat", rhat)
-    draws = draw_from(standard, 2, settings=SMALL)
-    assert draws.steps_run == 20
-    assert not draws.converged
     assert "interrupted" in draws.message
 
 
@@ -329,8 +242,7 @@ def test_scattered_walkers_lie_inside_and_differ():
     assert start.shape == (3, 10, 2)
     assert np.all(np.abs(start[..., 0] - 2.0) < 0.2)
     assert np.unique(start).size == start.size
-    np.testing.assert_array_equal(
-        start, scatter_walkers(log_probability, wide, parameters=2, seed=1, settings=settings)
-    )
+    again = scatter_walkers(log_probability, wide, parameters=2, seed=1, settings=settings)
+    np.testing.assert_array_equal(start, again)
     with refused(InferenceError, "0 of 1000"):
         scatter_walkers(lambda x: np.full(len(x), -np.inf), wide, parameters=2, seed=1, settings=settings)

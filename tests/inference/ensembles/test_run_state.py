@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
-from tactile_bayes.inference.ensembles import SamplerSettings, run_state, sample
+from tactile_bayes.inference.ensembles import run_state
 from tactile_bayes.inference.ensembles.run_state import Block, RunState
 
 
@@ -38,28 +38,17 @@ def little_memory(monkeypatch):
     monkeypatch.setattr(run_state, "_MAX_STORED", 10 * 24)
 
 
-@pytest.mark.parametrize("steps", [1, 2, 7, 20])
+@pytest.mark.parametrize(("steps", "every"), [(1, 1), (2, 1), (7, 1), (20, 1), (21, 2), (22, 2), (43, 4), (100, 8)])
 @pytest.mark.usefixtures("little_memory")
-def test_of_few_steps_the_second_half_is_kept(steps):
-    samples = walked(steps)
-    points, values, walkers_moved, every = second_half(appended(samples, [steps], Coordinates()))
-    np.testing.assert_array_equal(points, samples[:, steps // 2 + 1 :])
-    np.testing.assert_array_equal(values, points.sum(axis=-1))
-    moved = np.any(points[:, 1:] != points[:, :-1], axis=-1)
-    np.testing.assert_array_equal(walkers_moved, moved)
-    assert every == 1
-
-
-@pytest.mark.parametrize(("steps", "every"), [(21, 2), (22, 2), (43, 4), (100, 8)])
-@pytest.mark.usefixtures("little_memory")
-def test_of_many_steps_every_so_manieth_is_kept(steps, every):
+def test_the_second_half_is_kept_and_of_many_steps_every_so_manieth(steps, every):
     """And whether walkers moved is known of all of them."""
     samples = walked(steps)
-    points, _, moved, thinning = second_half(appended(samples, [steps], Coordinates()))
+    points, values, moved, thinning = second_half(appended(samples, [steps], Coordinates()))
     assert thinning == every
     assert points.shape[1] <= 11
     number = np.arange(steps + 1)
     np.testing.assert_array_equal(points, samples[:, (number > steps // 2) & (number % every == 0)])
+    np.testing.assert_array_equal(values, points.sum(axis=-1))
     np.testing.assert_array_equal(moved, np.any(np.diff(samples[:, steps // 2 + 1 :], axis=1) != 0.0, axis=-1))
 
 
@@ -77,31 +66,6 @@ def test_blocks_and_looks_make_no_difference():
         for one, another in zip(second_half(whole), second_half(other), strict=True):
             np.testing.assert_array_equal(one, another)
         assert second_half(other)[-1] > 1
-
-
-@pytest.mark.slow
-def test_a_thinned_run_is_the_same_run(monkeypatch, tmp_path):
-    """Steps, acceptance and autocorrelation time are of all steps, also where a run goes on from a checkpoint."""
-    settings = SamplerSettings(ensembles=2, walkers=8, block_steps=200, max_steps=1600, min_ess=1e9)
-    start = np.random.default_rng(0).normal(size=(2, 8, 1))
-
-    def drawn(**options):
-        chosen = SamplerSettings(**{**settings.__dict__, **options.pop("settings", {})})
-        return sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=1, settings=chosen, **options)
-
-    whole = drawn()
-    monkeypatch.setattr(run_state, "_MAX_STORED", 16 * 250)
-    thinned = drawn()
-    assert (whole.every, thinned.every) == (1, 4)
-    assert (whole.steps_kept, thinned.steps_kept, thinned.steps_run) == (800, 200, 1600)
-    np.testing.assert_array_equal(thinned.by_walker(), whole.by_walker()[:, :, 3::4])
-    np.testing.assert_array_equal(thinned.acceptance, whole.acceptance)
-    # Walkers forget within two steps, so that of every fourth the time is as good as its least, four.
-    assert thinned.autocorrelation_time[0] == pytest.approx(4.0, rel=0.3)
-    drawn(checkpoint=tmp_path, settings={"max_steps": 930})
-    resumed = drawn(checkpoint=tmp_path)
-    np.testing.assert_array_equal(resumed.samples, thinned.samples)
-    np.testing.assert_array_equal(resumed.acceptance, thinned.acceptance)
 
 
 @pytest.mark.parametrize(("count", "stay"), [(4, 0), (5, 5)])

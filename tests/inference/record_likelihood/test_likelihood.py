@@ -2,29 +2,25 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy import stats
-from scipy.optimize import brentq
 
 from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
-from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
-from tactile_bayes.contours import Circle, Parabola, PowerLaw
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.contours import Circle, Contour, Parabola, PowerLaw
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood, events_of
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
-from tactile_bayes.mechanics.poses.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.record.units import with_rod
-from tactile_bayes.rig import Rig, make_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Motion, Translation, scan
 
 SHARE = {False: 3e-4, True: 1e-6}  # error of the interpolated loads over their largest value, at worst, in 150 contours
@@ -62,39 +58,34 @@ def stack(contours):
     return family(*(np.array([getattr(c, name) for c in contours], dtype=float) for name in vars(contours[0])))
 
 
+class Case(NamedTuple):
+    """A true contour, another one, and the rig that reads the loads."""
+
+    true: Contour
+    other: Contour
+    rod: Rod = Rod()
+    cell: LoadCell = CELL
+    bases: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    friction: float = 0.0
+
+
+PARABOLAS = Parabola(0.5, 0.5), Parabola(0.503, 0.4995)
+CIRCLES = Circle(0.4, 0.4, 0.1), Circle(0.41, 0.401, 0.1)
+WIRES = Parabola(2.5, 0.1), Parabola(2.52, 0.0999, 0.0004)
+BENT_WIRE = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9, rest_curvature=1.5)
+BENT_CONE = Rod(diameter=0.02, taper=0.3, rest_curvature=lambda s: 0.6 * s - 0.2)
 RIGS = {
-    "dimensionless": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(), CELL, ((0.0, 0.0),), 0.0),
-    "far off": (Parabola(0.5, 0.5), Parabola(0.9, 0.35, -0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
-    "circle": (Circle(0.6, 0.4, 0.1), Circle(0.61, 0.401, 0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
-    "SI": (Parabola(2.5, 0.1), Parabola(2.52, 0.0999, 0.0004), WIRE, WIRE_CELL, ((0.0, 0.0),), 0.0),
-    "diameter": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(diameter=0.02), CELL, ((0.0, 0.0),), 0.0),
-    "pivots": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.2, 0.1), (-0.3, 0.0)), 0.0),
-    "friction": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.0, 0.0),), 0.3),
-    "arc": (Circle(0.4, 0.4, 0.1), Circle(0.41, 0.401, 0.1), Rod(rest_curvature=0.6), CELL, ((0.0, 0.0),), 0.3),
-    "tapered": (
-        Circle(0.4, 0.4, 0.1),
-        Circle(0.41, 0.401, 0.1),
-        Rod(diameter=0.03, taper=0.5),
-        CELL,
-        ((0.0, 0.0),),
-        0.0,
-    ),
-    "curved by a function": (
-        Parabola(0.5, 0.5),
-        Parabola(0.503, 0.4995),
-        Rod(diameter=0.02, taper=0.3, rest_curvature=lambda s: 0.6 * s - 0.2),
-        CELL,
-        ((0.0, 0.0),),
-        0.3,
-    ),
-    "arc in SI": (
-        Parabola(2.5, 0.1),
-        Parabola(2.52, 0.0999, 0.0004),
-        Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9, rest_curvature=1.5),
-        WIRE_CELL,
-        ((0.0, 0.0),),
-        0.0,
-    ),
+    "dimensionless": Case(Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002)),
+    "far off": Case(Parabola(0.5, 0.5), Parabola(0.9, 0.35, -0.1)),
+    "circle": Case(Circle(0.6, 0.4, 0.1), Circle(0.61, 0.401, 0.1)),
+    "SI": Case(*WIRES, WIRE, WIRE_CELL),
+    "diameter": Case(*PARABOLAS, Rod(diameter=0.02)),
+    "pivots": Case(*PARABOLAS, bases=((0.2, 0.1), (-0.3, 0.0))),
+    "friction": Case(*PARABOLAS, friction=0.3),
+    "arc": Case(*CIRCLES, Rod(rest_curvature=0.6), friction=0.3),
+    "tapered": Case(*CIRCLES, Rod(diameter=0.03, taper=0.5)),
+    "curved by a function": Case(*PARABOLAS, BENT_CONE, friction=0.3),
+    "arc in SI": Case(*WIRES, BENT_WIRE, WIRE_CELL),
 }
 
 
@@ -108,7 +99,7 @@ def measured_by(rig):
 @cache
 def exact_by(rig):
     """The loads of the first contour there."""
-    return exact_loads(measured_by(rig), RIGS[rig][0], RIGS[rig][5])
+    return exact_loads(measured_by(rig), RIGS[rig].true, RIGS[rig].friction)
 
 
 # Rigs of which the loads are compared in every run, and sums of densities on demand.
@@ -144,24 +135,14 @@ def test_against_an_independent_sum(rig):
                 assert np.all(is_right | np.isnan(expected))
 
 
-def test_the_rest_curvature_of_a_rig_is_that_of_the_rod_in_addition():
-    """In both directions; and a straight rod is noticed where the true one is curved."""
-    true, other, rod, cell, _, friction = RIGS["arc"]
-    measured, contours = measured_by("arc"), stack([true, other])
-    stated = RecordLikelihood(measured, cell, friction).log_likelihood(contours)
-    taken_for_straight = RecordLikelihood(with_rod(measured, Rod()), cell)
-    rig = RigValues(rest_curvature=rod.rest_curvature, friction=friction)
-    np.testing.assert_array_equal(taken_for_straight.log_likelihood(contours, rig=rig), stated)
-    assert taken_for_straight.log_likelihood(contours, rig=RigValues(friction=friction)).max() < stated.max() - 100.0
-
-
 @pytest.mark.parametrize("rod", ["arc", "curved by a function"])
-def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
-    """A likelihood that takes it as stated has another table; both have errors as large as noise requires."""
+def test_taper_and_rest_curvature_of_a_rig_are_those_of_the_rod_in_addition(rod):
+    """A likelihood that takes them as stated has another table; both have errors as large as noise requires."""
     true, other, stated, cell, _, friction = RIGS[rod]
-    contours, tapered = stack([true, other]), replace(stated, taper=stated.taper + 0.1)
-    record = cell.measure(swept(true, rod=tapered, friction=friction, step=np.radians(5.0)), rng=3)
-    rig = RigValues(taper=np.array([0.1, 0.1]), friction=friction)
+    contours = stack([true, other])
+    changed = stated.reshaped(stated.mean_rest_curvature + 0.1, stated.taper + 0.1)
+    record = cell.measure(swept(true, rod=changed, friction=friction, step=np.radians(5.0)), rng=3)
+    rig = RigValues(taper=np.array([0.1, 0.1]), rest_curvature=0.1, friction=friction)
     for exact in (True, False):
         known = RecordLikelihood(record, cell, friction, exact)
         with_rig = RecordLikelihood(with_rod(record, stated), cell, friction, exact)
@@ -170,26 +151,12 @@ def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
         assert with_rig.log_likelihood(contours).max() < expected.max() - 10.0
 
 
-@pytest.mark.slow
-def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
-    """Draws of taper, rest curvature and friction in the ranges of the table and beyond them, as without a table."""
-    cell, friction = RIGS["curved by a function"][3], RIGS["curved by a function"][5]
-    measured, rng = measured_by("curved by a function"), np.random.default_rng(1)
-    count = 40
-    contours = stack([Parabola(*place) for place in rng.normal([0.5, 0.5, 0.0], 0.01, (count, 3))])
-    rig = RigValues(
-        taper=rng.normal(0.0, 0.1, count),
-        rest_curvature=rng.normal(0.0, 0.1, count),
-        friction=np.abs(rng.normal(0.0, 0.4, count)),
-    )
-    assert np.any(np.abs(rig.taper) > 0.15)
-    assert np.any(np.arctan(rig.friction) > 0.5)
-    loads, usable = RecordLikelihood(measured, cell, friction).predict(contours, rig)
-    exact, usable_exactly = RecordLikelihood(measured, cell, friction, exact=True).predict(contours, rig)
+def by_table_and_exactly(record, contours, rig, **options):
+    """Loads of contours that both find usable, and both likelihoods."""
+    both = [RecordLikelihood(record, CELL, exact=exact, **options) for exact in (False, True)]
+    (loads, usable), (exact, usable_exactly) = (each.predict(contours, rig) for each in both)
     np.testing.assert_array_equal(usable, usable_exactly)
-    error = SHARE[False] * np.abs(exact).max(axis=(0, 1))
-    close = np.all(np.abs(loads - exact) <= error, axis=-1)
-    assert np.count_nonzero(~close) <= 4  # samples so near snap-off that they are on the other side of it
+    return loads[usable], exact[usable], *both
 
 
 @pytest.mark.slow
@@ -200,19 +167,14 @@ def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
     bend, friction = rng.uniform(-0.1, 0.1, count), np.abs(rng.normal(0.2, 0.1, count))
     rig = RigValues(rest_curvature=bend, friction=friction, stem=rng.uniform(-0.02, 0.02, count))
     for drive in (Translation((0.11, 0.0), np.pi, 1.13, 1.1), Translation((0.3, -1.2), 2.05, 1.13, 1.1)):
-        measured = CELL.measure(
-            scan(Circle(0.29, 0.21), rig=Rig(rod=rod, unknown={"friction": 0.2}), drive=drive).record, rng=1
-        )
-        places = 0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])
-        likelihood, exactly = (RecordLikelihood(measured, CELL, exact=exact) for exact in (False, True))
-        loads, usable = likelihood.predict(Circle(*places), rig)
-        assert likelihood._tables.made[False, True, True, False, False] is not NO_TABLE
-        exact, usable_exactly = exactly.predict(Circle(*places), rig)
-        np.testing.assert_array_equal(usable, usable_exactly)
-        assert np.count_nonzero(usable) > 20
-        np.testing.assert_allclose(loads[usable], exact[usable], atol=2e-4 * np.abs(exact).max())
-        angles = likelihood.paths(Circle(*places), rig).events[usable, 0, STATE_COLUMNS.index("friction_angle")]
-        senses += np.sign(angles).tolist()
+        scanned = scan(Circle(0.29, 0.21), rig=Rig(rod=rod, unknown={"friction": 0.2}), drive=drive)
+        measured = CELL.measure(scanned.record, rng=1)
+        circles = Circle(*(0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])))
+        loads, exact, likelihood, _ = by_table_and_exactly(measured, circles, rig)
+        assert len(loads) > 20
+        np.testing.assert_allclose(loads, exact, atol=2e-4 * np.abs(exact).max())
+        angles = likelihood.paths(circles, rig).events[..., 0, STATE_COLUMNS.index("friction_angle")]
+        senses += np.sign(angles[likelihood.usable(circles, rig)]).tolist()
     assert set(senses) == {-1.0, 1.0}
 
 
@@ -225,12 +187,9 @@ def test_rods_that_stick_are_as_without_a_table(sign):
     rig = RigValues(friction=rng.uniform(0.0, 0.5, count))
     measured = swept(Parabola(2.0, 0.8), rod=rod, step=np.radians(2.0))
     contours = Parabola(*(rng.normal(size=(3, count)) * [[0.1], [0.02], [0.02]] + [[2.0], [0.8], [0.0]]))
-    loads, usable = RecordLikelihood(measured, CELL, rubs=True).predict(contours, rig)
-    exactly = RecordLikelihood(measured, CELL, rubs=True, exact=True)
-    exact, usable_exactly = exactly.predict(contours, rig)
-    np.testing.assert_array_equal(usable, usable_exactly)
-    assert np.count_nonzero(usable) > 30
-    np.testing.assert_allclose(loads[usable], exact[usable], atol=2e-4 * np.abs(exact).max())
+    loads, exact, _, exactly = by_table_and_exactly(measured, contours, rig, rubs=True)
+    assert len(loads) > 30
+    np.testing.assert_allclose(loads, exact, atol=2e-4 * np.abs(exact).max())
     assert sum(any(mode.sticks for mode in modes) for modes in exactly.paths(contours, rig).modes()) > 10
 
 
@@ -244,67 +203,38 @@ def test_rods_curved_toward_a_flat_object_touch_it_twice_with_a_table_too():
     assert np.count_nonzero(usable[0] != usable[1]) <= 1
 
 
-def swept_in(rig):
-    true, other, _, cell, _, friction = RIGS[rig]
-    return measured_by(rig), stack([true, other]), cell, friction
-
-
-@pytest.mark.parametrize("rig", SUMMED)
-def test_the_frame_of_the_load_cell_does_not_matter(rig):
-    """With noise of one size on both forces, turning data and prediction alike changes no density."""
-    measured, contours, cell, friction = swept_in(rig)
-    scale = np.array([1.0, 1.3])[:, None]
-    fixed = RecordLikelihood(measured, cell, friction)
-    turning = RecordLikelihood(in_frame(measured, "turning"), cell, friction)
-    for pointwise in (False, True):
-        expected = fixed.log_likelihood(contours, scale, pointwise=pointwise)
-        found = turning.log_likelihood(contours, scale, pointwise=pointwise)
-        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
-
-
 @pytest.mark.parametrize("rig", RIGS)
 def test_predictions_are_in_the_frame_of_the_record(rig):
-    measured, contours, cell, friction = swept_in(rig)
+    true, _, rod, cell, _, friction = RIGS[rig]
+    measured = measured_by(rig)
     likelihood = RecordLikelihood(in_frame(measured, "turning"), cell, friction, True)
-    predicted, _ = likelihood.predict(contours)
-    rod = RIGS[rig][2]
-    load, angle = exact_by(rig), measured.drive_angle.values
-    exact = np.stack(
-        [
-            load[:, 0] / rod.moment_unit,
-            (load[:, 1] * np.cos(angle) + load[:, 2] * np.sin(angle)) / rod.force_unit,
-            (load[:, 2] * np.cos(angle) - load[:, 1] * np.sin(angle)) / rod.force_unit,
-        ],
-        axis=-1,
-    )
-    largest = np.abs(load / rod.load_units).max(axis=0)
+    predicted, _ = likelihood.predict(stack([true]))
+    angle = measured.drive_angle.values
+    moment, x, y = (exact_by(rig) / rod.load_units).T
+    exact = np.stack([moment, x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)], axis=-1)
+    largest = np.abs([moment, x, y]).max(axis=1)
     error = SHARE[True] * np.array([largest[0], *[np.sum(largest[1:])] * 2])
     assert np.all(np.abs(predicted[0] - exact) <= error)
     np.testing.assert_array_equal(likelihood.measured[:, 0], measured.holding_moment.values / rod.moment_unit)
 
 
-@pytest.mark.parametrize("missing", [("force_x", "force_y"), ("force_x",), ("force_y",), ("holding_moment", "force_y")])
+@pytest.mark.parametrize(
+    "missing", [(), ("force_x", "force_y"), ("force_x",), ("force_y",), ("holding_moment", "force_y")]
+)
 def test_channels_may_be_missing_where_the_load_cell_turns(missing):
     """A single force is compared along its own axis, which the record alone could not be turned out of."""
-    measured, contours, cell, _ = swept_in("dimensionless")
+    measured, contours = measured_by("dimensionless"), stack(RIGS["dimensionless"][:2])
     turning = without(in_frame(measured, "turning"), *missing)
-    likelihood = RecordLikelihood(turning, cell)
-    whole, _ = RecordLikelihood(in_frame(measured, "turning"), cell).predict(contours)
+    likelihood = RecordLikelihood(turning, CELL)
+    whole, _ = RecordLikelihood(in_frame(measured, "turning"), CELL).predict(contours)
     present = [k for k, name in enumerate(CHANNELS) if name not in missing]
     densities = stats.norm.logpdf(
         np.stack([turning[CHANNELS[k]].values for k in present], axis=-1), whole[..., present], DEVIATIONS[present]
     )
     np.testing.assert_allclose(likelihood.log_likelihood(contours), densities.sum(axis=(1, 2)), rtol=1e-11)
     if missing == ("force_x", "force_y"):
-        fixed = RecordLikelihood(without(measured, *missing), cell)
+        fixed = RecordLikelihood(without(measured, *missing), CELL)
         np.testing.assert_array_equal(likelihood.log_likelihood(contours), fixed.log_likelihood(contours))
-
-
-def test_truth_is_more_likely_than_what_is_a_little_off():
-    measured = CELL.measure(swept(Parabola(0.5, 0.5)), rng=3)
-    off = [Parabola(0.5, 0.5), Parabola(0.51, 0.5), Parabola(0.5, 0.502), Parabola(0.5, 0.5, 0.005)]
-    values = RecordLikelihood(measured, CELL).log_likelihood(stack(off))
-    assert np.argmax(values) == 0
 
 
 def test_a_contour_out_of_reach_of_any_pivot_is_impossible():
@@ -323,31 +253,6 @@ def test_a_contour_out_of_reach_of_any_pivot_is_impossible():
     assert np.all(np.isneginf(likelihood.log_likelihood(stack(contours), pointwise=True)[1:]))
 
 
-def test_snap_off_tells_contours_apart():
-    """Across the contour that lets go at a sample's drive angle, likelihood jumps by what that sample says."""
-    record = swept(Parabola(0.5, 0.5), direction="forward")
-    measured = CELL.measure(record, rng=3)
-    last = int(np.flatnonzero(record.force_y.values)[-1])
-    angle = float(record.drive_angle[last])
-
-    def late(q):
-        return (
-            scan(Parabola(0.5, q), direction="forward", drive_step=0.5).events["forward"].snap_off.drive_angle - angle
-        )
-
-    q = brentq(late, 0.45, 0.55, xtol=1e-13)
-    sides = sorted((q - 1e-9, q + 1e-9), key=late)
-    assert late(sides[0]) < 0.0 < late(sides[1])
-    likelihood = RecordLikelihood(measured, CELL, exact=True)
-    let_go, held_on = likelihood.log_likelihood(stack([Parabola(0.5, q) for q in sides]))
-    values = np.array([float(measured[name][last]) for name in CHANNELS])
-    load = exact_loads(measured, Parabola(0.5, sides[1]))[last]
-    jump = (stats.norm.logpdf(values, load, DEVIATIONS) - stats.norm.logpdf(values, 0.0, DEVIATIONS)).sum()
-    assert held_on - let_go > 1000.0
-    # All loads of a contour that is 1e-9 off change by about as much, over deviations of 0.02 in 100 samples.
-    np.testing.assert_allclose(held_on - let_go, jump, rtol=1e-4)
-
-
 def test_order_of_sweeps_and_their_number_do_not_matter():
     measured = CELL.measure(swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.1))), rng=3)
     contours = stack([Parabola(0.5, 0.5), Parabola(0.505, 0.5)])
@@ -363,51 +268,15 @@ def test_order_of_sweeps_and_their_number_do_not_matter():
     np.testing.assert_allclose(RecordLikelihood(twice, CELL).log_likelihood(contours), 2.0 * expected, atol=1e-3)
 
 
-@pytest.mark.parametrize("direction", ["forward", "backward"])
-def test_a_drive_that_turns_back_in_contact_meets_the_same_side(direction):
-    """The way back takes the same states in reverse: contact points and likelihood know it by the moment's sign."""
-    contour = Parabola(0.5, 0.5)
-    out = scan(contour, direction=direction).record
-    out = out.isel(sample=slice(0, 100)).drop_vars([n for n in out.data_vars if n.startswith("truth_holding")])
-    back = out.isel(sample=slice(None, None, -1))
-    other = {"forward": "backward", "backward": "forward"}[direction]
-    columns = {
-        name: np.concatenate([out[name].values, back[name].values])
-        for name in (*CHANNELS, "drive_angle", "truth_contact_x")
-    }
-    columns |= {"sweep": np.repeat([0, 1], 100), "direction": np.repeat([direction, other], 100)}
-    both = make_record(columns)
-    contacts = reconstruct(both)
-    np.testing.assert_allclose(contacts.contact_x, both.truth_contact_x, atol=1e-10)
-    likelihood = RecordLikelihood(both, CELL)
-    predicted, _ = likelihood.predict(stack([contour]))
-    np.testing.assert_allclose(predicted[0], likelihood.measured, atol=1e-3)
-    noisy = RecordLikelihood(CELL.measure(both, rng=1), CELL)
-    np.testing.assert_array_equal(noisy.predict(stack([contour]))[0], predicted)
-
-
-def test_a_channel_without_noise_is_refused():
-    likelihood = RecordLikelihood(swept(Parabola(0.5, 0.5)), LoadCell(moment_noise=0.02))
-    with refused(ParameterError, "force_x", "noise"):
-        likelihood.log_likelihood(stack([Parabola(0.5, 0.5)]))
-
-
 @pytest.mark.parametrize("missing", [(), ("force_x", "force_y")])
 def test_a_moment_that_is_counted_the_other_way_round_turns_no_side(missing):
     """The side of contact follows the moment's sign, once the cell's known gain and bias are taken out of it."""
-    upright = LoadCell(force_noise=0.05, moment_noise=0.02)
-    turned = LoadCell(
-        force_noise=0.05,
-        moment_noise=0.02,
-        gain=((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-        bias=(30.0, 0.0, 0.0),
-    )
-    contour = Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0]))
+    turned = replace(CELL, gain=((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), bias=(30.0, 0.0, 0.0))
     record = scan(Parabola(0.5, 0.5), drive_step=np.radians(3.0)).record
     values = []
-    for cell in (upright, turned):
+    for cell in (CELL, turned):
         measured = without(cell.measure(record, rng=1), *missing)
-        values.append(RecordLikelihood(measured, cell).log_likelihood(contour)[0])
+        values.append(RecordLikelihood(measured, cell).log_likelihood(stack([Parabola(0.5, 0.5)]))[0])
     # Not one number: the noise on the moment has the other sign.
     assert values[0] == pytest.approx(values[1], abs=4.0 * np.sqrt(2.0 * record.sizes["sample"]))
 
@@ -440,19 +309,9 @@ def off_at_the_truth(noise, family, numbers):
     return np.abs(off)
 
 
-@pytest.mark.parametrize(
-    ("noise", "family", "count"),
-    [
-        pytest.param(1.0, "parabola", 30, marks=pytest.mark.slow),
-        (0.01, "parabola", 30),
-        *(pytest.param(noise, "parabola", 1000, marks=pytest.mark.slow) for noise in (1.0, 0.1, 0.01)),
-        *(
-            pytest.param(noise, name, 300, marks=pytest.mark.slow)
-            for noise in (1.0, 0.1, 0.01)
-            for name in ("power-law", "ellipse")
-        ),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [1.0, 0.1, 0.01])
+@pytest.mark.parametrize(("family", "count"), [("parabola", 1000), ("power-law", 300), ("ellipse", 300)])
 def test_interpolation_is_not_felt_at_the_truth(noise, family, count):
     """Log-likelihoods of default-prior records, near pivots too, are within 0.05 of the exact ones."""
     assert off_at_the_truth(noise, family, range(count)).max() < 0.05
@@ -511,14 +370,12 @@ def test_a_rod_with_amplitudes_of_its_modes_is_the_rod_that_has_this_curvature()
     rig = RigValues(friction=rng.uniform(0.0, 0.3, count), rest_shape=rng.normal(size=(count, len(modes))))
     by_table, exactly = (RecordLikelihood(record, CELL, exact=exact) for exact in (False, True))
     found, exact = (of.log_likelihood(drawn, rig=rig) for of in (by_table, exactly))
-    assert all(table is not NO_TABLE for table in by_table._tables.made.values())
     np.testing.assert_allclose(found, exact, rtol=1e-4, atol=0.05)
     exact = exactly.log_likelihood(drawn, rig=rig._replace(rest_curvature=0.02))
     for k, z in enumerate(rig.rest_shape):
         shaped = rod.shaped(z)
-        own = RecordLikelihood(
-            with_rod(record, shaped.reshaped(shaped.mean_rest_curvature + 0.02, 0.0)), CELL, exact=True
-        )
+        shaped = shaped.reshaped(shaped.mean_rest_curvature + 0.02, 0.0)
+        own = RecordLikelihood(with_rod(record, shaped), CELL, exact=True)
         one = own.log_likelihood(drawn.take(np.array([k])), rig=RigValues(friction=rig.friction[[k]]))
         np.testing.assert_allclose(one, exact[k], rtol=1e-9)
 
@@ -533,12 +390,8 @@ def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
     assert [len(each.segments) for each in (once, twice)] == [1, 2]
     contours = Circle(np.array([0.3, 0.305]), np.array([0.8, 0.8]), np.array([0.0, 0.01]))
     np.testing.assert_allclose(once.log_likelihood(contours), twice.log_likelihood(contours), atol=1e-6)
-    np.testing.assert_array_equal(
-        once.predict(contours)[0][:, : measured.sizes["sample"] // 2],
-        once.predict(contours)[0][:, measured.sizes["sample"] // 2 :],
-    )
-    steps = [np.count_nonzero(np.isinf(each.segments.course.step)) for each in (once, twice)]
-    assert steps == [1, 2]
+    np.testing.assert_array_equal(*np.split(once.predict(contours)[0], 2, axis=1))
+    assert [np.count_nonzero(np.isinf(each.segments.course.step)) for each in (once, twice)] == [1, 2]
     assert once.segments.ways(np.array([[0.5]])) == pytest.approx(twice.segments.ways(np.array([[0.5, 0.5]]))[:, :1])
 
 
@@ -556,46 +409,36 @@ def test_contours_that_release_a_rod_are_usable_in_a_likelihood_as_well(rod, fri
     assert exact.usable(contours).any()
 
 
-@pytest.mark.parametrize("rig", ["straight", "arc", "curved by a function", "carried"])
+@pytest.mark.parametrize("rig", ["straight", "arc", "cone", "curved by a function", "carried"])
 def test_the_length_of_a_rig_is_that_of_a_rod_of_the_same_proportions(rig):
     """Against a likelihood for which the rod is stated, in SI units; with a suspension and a stem."""
     shape = {
         "arc": {"rest_curvature": 4.0, "stem": 0.003},
+        "cone": {"diameter": 1e-3, "taper": 0.5},
         "curved by a function": {"rest_curvature": lambda s: 80.0 * s},
     }
-    stated = Rod(0.1, 2e-4, diameter=5e-4, **shape.get(rig, {}))
-    longer = stated.reshaped(stated.mean_rest_curvature / 1.02, 0.0, length=0.102)
+    stated = Rod(0.1, 2e-4, **{"diameter": 5e-4} | shape.get(rig, {}))
+    longer = stated.reshaped(stated.mean_rest_curvature / 1.02, stated.taper, length=0.102)
     np.testing.assert_allclose(longer.mean_rest_curvature * longer.length, stated.mean_rest_curvature * stated.length)
     drive = Motion([0.08, 0.0, -0.08], [0.0, 0.002, 0.0], [0.9, 1.1, 1.1]) if rig == "carried" else None
     true = Circle(0.03, 0.045)
     record = scan(true, rig=Rig(rod=longer, unknown={"friction": 0.2}), drive=drive).record
     cell = LoadCell(force_noise=1e-4, moment_noise=1e-5)
     contours = stack([true, Circle(0.0303, 0.0452)])
-    off = {
-        "friction": 0.2,
-        "suspension_compliance": np.full(2, 0.01),
-        "rigidity_scale": 1.1,
-        "drive_angle_offset": 1e-3,
-    }
+    off = RigValues(friction=0.2, rigidity_scale=1.1, drive_angle_offset=1e-3)
+    # The compliance is in rad per EI/L of the stated rod.
+    of_known = off._replace(suspension_compliance=np.full(2, 0.01 / 1.02))
+    of_found = off._replace(suspension_compliance=np.full(2, 0.01), length=np.full(2, 1.02))
     for exact in (True, False):
         known = RecordLikelihood(with_rod(record, longer), cell, exact=exact)
         found = RecordLikelihood(with_rod(record, stated), cell, exact=exact)
-        # The compliance is in rad per EI/L of the stated rod.
-        expected, usable = known.predict(
-            contours, RigValues(**off | {"suspension_compliance": np.full(2, 0.01 / 1.02)})
-        )
-        loads, usable_too = found.predict(contours, RigValues(**off, length=1.02))
+        expected, usable = known.predict(contours, of_known)
+        loads, usable_too = found.predict(contours, of_found)
         assert usable.all()
         np.testing.assert_array_equal(usable_too, usable)
         expected, loads = expected * longer.load_units, loads * stated.load_units
         error = SHARE[exact] * np.abs(expected).max(axis=(0, 1))
         assert np.all(np.abs(loads - expected) <= error)
-    events = [
-        events_of(likelihood, contours, RigValues(**off | more))
-        for likelihood, more in (
-            (known, {"suspension_compliance": np.full(2, 0.01 / 1.02)}),
-            (found, {"length": np.full(2, 1.02)}),
-        )
-    ]
-    for name, expected in events[0].items():
-        np.testing.assert_allclose(events[1][name], expected, atol=1e-9, err_msg=name)
+    events = events_of(found, contours, of_found)
+    for name, expected in events_of(known, contours, of_known).items():
+        np.testing.assert_allclose(events[name], expected, atol=1e-9, err_msg=name)

@@ -2,21 +2,22 @@
 
 import numpy as np
 
+from helpers.contour_posteriors import CELL
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.sweep import scan
+
+RECORD = scan(Parabola(0.5, 0.5), drive_step=0.05).record
 
 
 def test_events_lie_where_most_samples_say():
     """Also where some of them are taken for what they are not."""
-    record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
-    likelihood = RecordLikelihood(record, LoadCell(force_noise=0.05, moment_noise=0.02))
-    loaded = (record.force_y != 0.0).values
+    likelihood = RecordLikelihood(RECORD, CELL)
+    loaded = (RECORD.force_y != 0.0).values
     events = likelihood.segments.event_samples(loaded)
     for row, direction in zip(events, ("forward", "backward"), strict=True):
-        own = np.flatnonzero((record.direction == direction).values)
+        own = np.flatnonzero((RECORD.direction == direction).values)
         inside = own[loaded[own]]
         assert row.tolist() == [inside[0] - 1, inside[0], inside[-1], inside[-1] + 1]
     mistaken = loaded.copy()
@@ -29,6 +30,5 @@ def test_events_lie_where_most_samples_say():
 
 
 def test_no_events_without_a_load():
-    record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
-    segments = RecordSegments(record, LoadCell(force_noise=0.05, moment_noise=0.02))
-    assert (segments.event_samples(np.zeros(record.sizes["sample"], dtype=bool)) == -1).all()
+    segments = RecordSegments(RECORD, CELL)
+    assert (segments.event_samples(np.zeros(RECORD.sizes["sample"], dtype=bool)) == -1).all()

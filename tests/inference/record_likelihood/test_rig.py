@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
-from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, only, swept
+from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, only, swept, without
 from helpers.refusals import refused
 from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Parabola, from_function
@@ -23,7 +23,7 @@ from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import with_rod
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import Rig
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import expanded
@@ -40,6 +40,11 @@ def read(contour, seed, **options):
     lever = TRUE["lever_x"], TRUE["lever_y"]
     gain = tuple(map(tuple, TRUE["rigidity_scale"] * np.eye(3)))
     cell = replace(CELL, drive_angle_offset=TRUE["drive_angle_offset"], gain=gain, lever=lever)
+    return read_by(cell, contour, seed, **options)
+
+
+def read_by(cell, contour, seed, **options):
+    """A record whose header does not state the load cell."""
     record = cell.measure(swept(contour, step=0.05, **options), rng=seed)
     record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
     return record
@@ -51,15 +56,16 @@ def read_from(*pivots):
     return record.isel(sample=np.isin(record.sweep.values // 2, pivots))
 
 
+def calibrated_on(record, rig):
+    return calibrate_rig(record, contour=PIN, rig=rig, rng=1, settings=SOUND)
+
+
+STATED = Rig(load_cell=CELL, unknown=UNKNOWN)
+
+
 @cache
 def rig_from(*pivots):
-    return calibrate_rig(
-        read_from(*pivots),
-        contour=PIN,
-        rig=Rig(load_cell=CELL, unknown=UNKNOWN),
-        rng=1,
-        settings=SOUND,
-    )
+    return calibrated_on(read_from(*pivots), STATED)
 
 
 def rig():
@@ -69,17 +75,13 @@ def rig():
 @cache
 def rig_of_two():
     """The rig from two records, one after the other."""
-    return calibrate_rig(read_from(1), contour=PIN, rig=rig(), rng=1, settings=SOUND)
+    return calibrated_on(read_from(1), rig())
 
 
 @cache
 def found(which):
-    given = {
-        "rig": rig,
-        "default": lambda: Rig(load_cell=CELL, unknown=UNKNOWN),
-        "truth": lambda: Rig(load_cell=CELL, unknown=only(**TRUE)),
-    }[which]()
-    return infer_contour(read(OBJECT, 2), rig=given, rng=1, settings=SOUND)
+    given = {"rig": rig, "default": lambda: STATED, "truth": lambda: Rig(load_cell=CELL, unknown=only(**TRUE))}
+    return infer_contour(read(OBJECT, 2), rig=given[which](), rng=1, settings=SOUND)
 
 
 def drawn(priors=("rigidity_scale", "lever_x"), **attrs):
@@ -94,7 +96,8 @@ def drawn(priors=("rigidity_scale", "lever_x"), **attrs):
     tree = xr.DataTree.from_dict({"posterior": draws})
     stated = {"gauge": "", "converged": 1, "nuisances": json.dumps(list(priors)), "data_sha256": "0"}
     stated |= {"load_cell_frame": "fixed", "rod_length": 1.0, "rod_flexural_rigidity": 1.0, "rod_diameter": 0.0}
-    tree.attrs = {**stated, "units": "dimensionless", **attrs}
+    stated |= {"units": "dimensionless", **attrs}
+    tree.attrs = {name: value for name, value in stated.items() if value is not None}
     return tree
 
 
@@ -104,15 +107,12 @@ def calibrated(prior, **said):
     return Rig(load_cell=CELL, unknown=left, calibration=prior)
 
 
-def test_the_rig_is_found_with_its_gauge():
-    tree = rig().calibration.posterior
+def test_the_rig_is_found_with_its_gauge_and_what_lasts_of_it_is_calibrated():
+    found = rig()
+    tree = found.calibration.posterior
     assert_near(tree, TRUE)
     assert tree.attrs["gauge"] == repr(PIN)
     assert list(tree["posterior"].data_vars) == [*NAMES, "noise_scale"]
-
-
-def test_what_was_unknown_and_lasts_is_calibrated_and_the_rest_stays_as_it_was():
-    found = rig()
     assert set(found.calibration.priors) == set(NAMES)
     unlike = "backlash", "friction", "taper_error", *GROUPS["bias"], *GROUPS["rest_shape"]
     assert found.known == dict.fromkeys(unlike, 0.0)
@@ -122,16 +122,8 @@ def test_what_was_unknown_and_lasts_is_calibrated_and_the_rest_stays_as_it_was()
 @pytest.mark.slow
 def test_a_stem_is_found_and_lasts():
     """The rod is stated to begin at the pivot, and begins 4 % of its length from there."""
-    true = Rod(stem=0.04)
-    record = CELL.measure(swept(PIN, step=0.05, rod=true), rng=1)
-    record = with_rod(record, Rod())
-    found = calibrate_rig(
-        record,
-        contour=PIN,
-        rig=Rig(load_cell=CELL, unknown={**NOTHING, "stem": "default", "rigidity_scale": "default"}),
-        rng=1,
-        settings=SOUND,
-    )
+    record = with_rod(CELL.measure(swept(PIN, step=0.05, rod=Rod(stem=0.04)), rng=1), Rod())
+    found = calibrated_on(record, Rig(load_cell=CELL, unknown=only("stem", "rigidity_scale")))
     assert_near(found.calibration.posterior, {"stem": 0.04, "rigidity_scale": 1.0})
     assert float(found.calibration.posterior["posterior"].stem.std()) < 0.01
     assert set(found.calibration.priors) == {"stem", "rigidity_scale"}
@@ -169,9 +161,8 @@ def test_a_record_counts_once():
 def test_the_gauge_predicts_as_its_family():
     """The same density as a family's at the gauge's parameters, up to the prior of these."""
     record = read(PIN, 1)
-    stated = Rig(load_cell=CELL, unknown=UNKNOWN)
-    known = Experiment(record, stated, gauge=Gauge(PIN)).model
-    free = Experiment(record, stated, "circle").model
+    known = Experiment(record, STATED, gauge=Gauge(PIN)).model
+    free = Experiment(record, STATED, "circle").model
     points = np.array([[*TRUE.values(), 1.0], [1.0, 0.0, 0.0, 0.0, 1.2]])
     contour = np.tile([0.2, 0.5, 0.0], (2, 1))
     expected = free.log_likelihood(np.hstack([contour, points]))
@@ -251,25 +242,6 @@ def test_families_are_compared_with_the_rig():
     assert with_rig.attrs["most_probable"] == "parabola"
     evidences = (one["log_evidence"].sel(family="parabola") for one in (with_rig, by_hand))
     assert abs(float(next(evidences) - next(evidences))) < 0.2
-    with refused(ParameterError, "rod_length"):
-        compare_families(record, rig=calibrated(rig_prior(drawn(rod_length=0.1))), settings=QUICK, **known)
-
-
-@pytest.mark.slow
-def test_its_dependence_counts_as_the_prior_of_the_rig(monkeypatch):
-    """What is left for the likelihood is the likelihood."""
-    from tactile_bayes.assessment import prior_sensitivity as module
-
-    tree, parts = found("rig"), []
-    monkeypatch.setattr(
-        module, "_weights", lambda part, power: parts.append(part) or np.full(part.shape, 1 / part.size)
-    )
-    model = experiment_of(tree).model
-    module.prior_sensitivity(tree, model, {})
-    points = np.stack([tree["posterior"][name].values for name in model.names], axis=-1)
-    expected = model.log_likelihood(points[:, :5].reshape(-1, len(model.names)))
-    offset = parts[-1][:, :5].ravel() - expected
-    np.testing.assert_allclose(offset, offset[0], atol=0.05)  # six digits of priors
 
 
 def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept():
@@ -283,64 +255,64 @@ def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept
     assert "backlash" in Experiment(forward, calibrated(backlash)).model.names
 
 
-def test_others_are_refused():
-    with refused(InferenceError, "calibrate_rig"):
-        rig_prior(found_nothing())
-    with refused(InferenceError, "converged"):
-        rig_prior(drawn(converged=0))
-    with refused(InferenceError, "lasts"):
-        rig_prior(drawn(nuisances='["friction"]'))
+@pytest.mark.parametrize(
+    ("attrs", "kind", "named"),
+    [
+        ({"gauge": None}, InferenceError, "calibrate_rig"),
+        ({"converged": 0}, InferenceError, "converged"),
+        ({"nuisances": '["friction"]'}, InferenceError, "lasts"),
+        ({"units": "SI"}, ParameterError, "units"),
+        ({"rod_length": 0.1}, ParameterError, "rod_length"),
+        ({"load_cell_drive_angle_offset": 0.1}, ParameterError, "load_cell_drive_angle_offset"),
+    ],
+)
+def test_other_posteriors_are_refused(attrs, kind, named):
+    with refused(kind, named):
+        Experiment(read(OBJECT, 2), calibrated(rig_prior(drawn(**attrs)))).model  # noqa: B018
+
+
+def test_a_prior_of_what_is_calibrated_is_refused():
     with refused(ParameterError, "lever_x"):
         Rig(unknown={"lever_x": stats.norm(0.0, 0.1)}, calibration=rig_prior(drawn()))
-    for what, other in {"units": "SI", "rod_length": 0.1, "load_cell_drive_angle_offset": 0.1}.items():
-        with refused(ParameterError, what):
-            infer_contour(read(OBJECT, 2), rig=calibrated(rig_prior(drawn(**{what: other}))), rng=1, settings=QUICK)
 
 
-def test_other_gauges_are_refused():
-    record = read(PIN, 1)
-    for contour in ("circle", Circle(r=[0.2, 0.3], q=0.5), from_function(lambda x: 0.5 + x * x, (-1.0, 1.0))):
-        with refused(ParameterError, "contour"):
-            calibrate_rig(record, contour=contour, rng=1)
-    with refused(ParameterError, "nothing of the rig is unknown"):
-        calibrate_rig(record, contour=PIN, rig=Rig(unknown="nothing"), rng=1)
+FUNCTION = from_function(lambda x: 0.5 + x * x, (-1.0, 1.0))
 
 
-def found_nothing():
-    tree = drawn()
-    del tree.attrs["gauge"]
-    return tree
+@pytest.mark.parametrize(
+    ("contour", "unknown", "named"),
+    [
+        ("circle", {}, "contour"),
+        (Circle(r=[0.2, 0.3], q=0.5), {}, "contour"),
+        (FUNCTION, {}, "contour"),
+        (PIN, "nothing", "nothing of the rig is unknown"),
+    ],
+)
+def test_other_gauges_are_refused(contour, unknown, named):
+    with refused(ParameterError, named):
+        calibrate_rig(read(PIN, 1), contour=contour, rig=Rig(unknown=unknown), rng=1)
+
+
+def in_counts(gain, **options):
+    return LoadCell(moment_noise=5.0, gain=((gain, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), **options)
 
 
 @pytest.mark.slow
 def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
     """From the moment alone, whose reading is a curve; the object is then inferred with it."""
-    true = {"moment_gain": 1.1, "moment_curve_quadratic": 0.06, "moment_curve_cubic": 0.03}
-    true |= {"gauge_x": 0.01, "gauge_y": -0.006}
-    stated = LoadCell(moment_noise=5.0, gain=counts(900.0))
-    real = LoadCell(moment_noise=5.0, gain=counts(900.0 * 1.1), moment_curve=(0.06, 0.03))
-
-    def read_by(sensor, contour, seed):
-        record = sensor.measure(swept(contour, step=0.05), rng=seed)
-        record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
-        return record.assign({name: np.nan * record[name] for name in ("force_x", "force_y")})
-
-    known = {"rng": 1, "settings": SOUND}
-    unknown = only("gauge", "moment_curve", "moment_bias", moment_gain=stats.lognorm(s=0.3))
-    place = Circle(r=0.2, q=0.5 - 0.006, x_c=0.01)
-    whole = Rig(load_cell=stated, unknown=unknown)
-    found = calibrate_rig(read_by(real, place, 1), contour=PIN, rig=whole, **known)
-    assert_near(found.calibration.posterior, true)
-    assert set(found.calibration.priors) == {"moment_gain", *GROUPS["moment_curve"]}
-    posterior = infer_contour(read_by(real, OBJECT, 2), rig=found, **known)
-    assert_near(
-        posterior, {"a": 0.7, "q": 0.45, **{name: true[name] for name in ("moment_gain", *GROUPS["moment_curve"])}}
+    sensor = {"moment_gain": 1.1, "moment_curve_quadratic": 0.06, "moment_curve_cubic": 0.03}
+    real = in_counts(900.0 * 1.1, moment_curve=(0.06, 0.03))
+    pin, object_ = (
+        without(read_by(real, contour, seed), "force_x", "force_y")
+        for contour, seed in ((Circle(r=0.2, q=0.5 - 0.006, x_c=0.01), 1), (OBJECT, 2))
     )
+    unknown = only("gauge", "moment_curve", "moment_bias", moment_gain=stats.lognorm(s=0.3))
+    found = calibrated_on(pin, Rig(load_cell=in_counts(900.0), unknown=unknown))
+    assert_near(found.calibration.posterior, {**sensor, "gauge_x": 0.01, "gauge_y": -0.006})
+    assert set(found.calibration.priors) == set(sensor)
+    posterior = infer_contour(object_, rig=found, rng=1, settings=SOUND)
+    assert_near(posterior, {"a": 0.7, "q": 0.45, **sensor})
     assert not {"gauge_x", "gauge_y"} & set(posterior["posterior"].data_vars)
-
-
-def counts(gain):
-    return ((gain, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @pytest.mark.slow

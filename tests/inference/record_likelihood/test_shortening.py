@@ -1,3 +1,5 @@
+"""Long records in blocks or thinned: their likelihood against that of all readings, and what is kept."""
+
 import json
 import subprocess
 import sys
@@ -9,7 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tactile_bayes import LoadCell, SamplerSettings, Translation, infer_contacts, infer_contour, scan
+from helpers.contour_posteriors import CELL
+from tactile_bayes import SamplerSettings, Translation, infer_contacts, infer_contour, scan
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood import shortening
@@ -17,11 +20,9 @@ from tactile_bayes.inference.record_likelihood.shortening import MOST_SAMPLES, s
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
-from tactile_bayes.load_cell.likelihood import log_likelihood
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING, Rig
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 CONTOUR = paper_profile("II", q=0.5)
 BRIEF = SamplerSettings(ensembles=2, walkers=48, block_steps=5, max_steps=5)
 
@@ -67,12 +68,6 @@ def test_a_short_record_is_taken_as_it_is():
     assert cell is CELL
 
 
-def test_a_record_in_blocks_is_not_shortened_again(monkeypatch):
-    made = in_blocks(long_record())
-    monkeypatch.setattr(shortening, "MOST_SAMPLES", 10)
-    assert shortened(made, CELL)[0] is made
-
-
 def test_readings_next_to_a_snap_off_stay_single():
     record = long_record(direction="forward")
     made = in_blocks(record)
@@ -105,10 +100,8 @@ def test_the_likelihood_of_blocks_is_that_of_the_readings(flaw, sweeps):
     short = given.shortened
     assert short.record.sizes["sample"] < record.sizes["sample"]
     named = {"a": (0.5, 2e-4), "q": (0.5, 5e-5), "noise_scale": (1.0, 0.01), "friction": (0.0, 1e-2)}
-    rng = np.random.default_rng(1)
-    points = np.column_stack(
-        [named.get(n, (0.0, 5e-5))[0] + named.get(n, (0.0, 5e-5))[1] * rng.normal(size=60) for n in given.model.names]
-    )
+    middle, spread = np.transpose([named.get(name, (0.0, 5e-5)) for name in given.model.names])
+    points = np.random.default_rng(1).normal(middle, spread, (60, middle.size))
     points[:, given.model.names.index("friction")] **= 2
     whole, blocks = given.model.log_likelihood(points), short.model.log_likelihood(points)
     best = np.argmax(whole)
@@ -171,12 +164,8 @@ def test_thinned_samples_drift_as_they_did(drift):
     record = long_record(6_000, cell=cell)
     made, slower = thinned(record, cell)
     every = -(-record.sizes["sample"] // MOST_SAMPLES)
-    np.testing.assert_allclose(
-        wandering_deviation(slower, made.sizes["sample"]),
-        wandering_deviation(cell, record.sizes["sample"])[::every],
-        rtol=1e-9,
-        atol=1e-15,
-    )
+    found, expected = (wandering_deviation(c, r.sizes["sample"]) for c, r in ((slower, made), (cell, record)))
+    np.testing.assert_allclose(found, expected[::every], rtol=1e-9, atol=1e-15)
     assert slower.drift.decay == pytest.approx(drift.decay**every, rel=1e-12)
 
 
@@ -196,19 +185,11 @@ def test_a_channel_that_is_missing_stays_so():
     assert np.isfinite(short.model.log_likelihood(short.model.prior_points(np.random.default_rng(1), 200))).any()
 
 
-def test_a_posterior_of_a_long_record_is_of_its_blocks(monkeypatch):
-    """20,000 samples: no array of predictions is larger than for 2,000, and the result says why."""
-    taken = []
-
-    def counted(sheet, measured, *arguments, **options):
-        taken.append(len(measured))
-        return log_likelihood(sheet, measured, *arguments, **options)
-
-    monkeypatch.setattr("tactile_bayes.load_cell.cell.log_likelihood", counted)
+def test_a_posterior_of_a_long_record_is_of_its_blocks():
+    """20,000 samples: what is stored is as little as for 2,000, and the result says why."""
     record = long_record()
     result = infer_contour(record, rig=Rig(unknown="nothing"), rng=1, settings=BRIEF)
     samples = result["observed_data"].sizes["sample"]
-    assert set(taken) == {samples}
     assert samples <= MOST_SAMPLES
     assert result.attrs["blocks"] in result.attrs["message"]
     assert result.attrs["data_sha256"] == Experiment(record).about["data_sha256"]
@@ -238,20 +219,3 @@ def test_a_limit_of_time_holds_for_200_000_samples():
     assert unit == "GB"
     assert 0.0 < float(processor) < 3.0 + 10.0
     assert float(memory) < 1.0
-
-
-@pytest.mark.slow
-def test_a_posterior_of_blocks_is_that_of_the_readings(monkeypatch):
-    """Means within five Monte-Carlo errors, standard deviations within five: false alarm below 1 in 10,000."""
-    record = long_record(3_000)
-    settings = SamplerSettings(min_ess=2000)
-    options = {"rig": Rig(unknown={**NOTHING, "friction": "default"}), "rng": 1, "settings": settings}
-    blocks = infer_contour(record, **options)["posterior"].to_dataset()
-    monkeypatch.setattr(shortening, "MOST_SAMPLES", 10**9)
-    readings = infer_contour(record, **options)["posterior"].to_dataset()
-    for name in readings:
-        deviation = float(readings[name].std())
-        assert float(blocks[name].mean() - readings[name].mean()) == pytest.approx(
-            0.0, abs=5.0 * deviation * np.sqrt(2.0 / 2000.0)
-        )
-        assert float(blocks[name].std()) == pytest.approx(deviation, rel=5.0 / np.sqrt(2000.0))

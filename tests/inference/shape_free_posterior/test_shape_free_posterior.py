@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from scipy import stats
 from scipy.special import gamma, kv
 
-from helpers.contour_posteriors import only
+from helpers.contour_posteriors import CELL, only, swept, without
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.diagnostics.predictive_check import predictive_check
@@ -23,7 +22,8 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+SI = Rod(length=0.1, flexural_rigidity=2e-4)
+SI_CELL = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
 ALL: dict[str, float] = {}  # all that is unknown of a real rig
 SMOOTH = {"friction": 0.0}
 RADIUS = RandomRadius(shortest=0.4, longest=4.0, tolerance=0.01)
@@ -64,10 +64,8 @@ def test_the_radius_is_a_geometric_mean():
     np.testing.assert_allclose(np.log(radii).mean(axis=0), np.log(0.4), atol=2e-3)
 
 
-def model_of(unknown=SMOOTH, profile="II", rod=None, cell=CELL):
-    contour = paper_profile(profile, q=0.5)
-    if rod is not None:
-        contour = Parabola(0.5 / rod.length, 0.5 * rod.length)
+def model_of(unknown=SMOOTH, rod=None, cell=CELL):
+    contour = paper_profile("II", q=0.5) if rod is None else Parabola(0.5 / rod.length, 0.5 * rod.length)
     measured = cell.measure(scan(contour, rig=Rig(rod=rod), drive_step=np.radians(5.0)).record, rng=1)
     return model_of_record(measured, unknown, cell)
 
@@ -82,7 +80,6 @@ def whitened(model):
     return whitening_at(model, point, np.random.default_rng(1))
 
 
-SI = Rod(length=0.1, flexural_rigidity=2e-4)
 # With those that may vanish, between others.
 RUBBING = only("friction", "bias", "suspension_compliance", "rigidity_scale")
 
@@ -90,11 +87,9 @@ RUBBING = only("friction", "bias", "suspension_compliance", "rigidity_scale")
 @pytest.mark.parametrize(
     "rod", [pytest.param(None, marks=pytest.mark.slow, id="dimensionless"), pytest.param(SI, id="SI")]
 )
-def test_a_volume_grows_as_the_whitening_says(rod):
+def test_coordinates_lead_back_and_a_volume_grows_as_they_say(rod):
     """Log-determinant of the derivatives, by differences."""
-    unit = (1.0, 1.0) if rod is None else (rod.force_unit, rod.moment_unit)
-    model = model_of(rod=rod, cell=LoadCell(force_noise=0.05 * unit[0], moment_noise=0.02 * unit[1]))
-    whitening = whitened(model)
+    whitening = whitened(model_of(rod=rod, cell=CELL if rod is None else SI_CELL))
     rng = np.random.default_rng(2)
     size = whitening.mean.size
     whitening = whitening.standardised(0.1 * np.arange(size), np.eye(size) + 0.02 * rng.normal(size=(size, size)))
@@ -102,8 +97,10 @@ def test_a_volume_grows_as_the_whitening_says(rod):
     steps = 1e-5 * np.eye(point.size)
     ahead, behind = (whitening.parameters(point + sign * steps)[0] for sign in (1.0, -1.0))
     sign, determinant = np.linalg.slogdet((ahead - behind) / 2e-5)
-    assert whitening.parameters(point[None])[1][0] == pytest.approx(determinant, abs=1e-4)
+    there, growth = whitening.parameters(point[None])
+    assert growth[0] == pytest.approx(determinant, abs=1e-4)
     assert sign != 0.0
+    np.testing.assert_allclose(whitening.of(there)[0], point, atol=1e-6)
 
 
 def test_scales_that_lie_far_apart_leave_the_approximation_a_distribution():
@@ -140,13 +137,23 @@ def test_in_its_coordinates_the_posterior_is_nearly_standard_normal(noise, sprea
     assert np.std(left) < 1.0
 
 
+def assert_in_band(result, truth, width, scale=1.0):
+    """Of nine places at most one is outside of the 95 % band, and the record is described."""
+    x = scale * np.linspace(-0.6, 0.6, 9)
+    band = contour_band(result, x)
+    inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
+    assert inside.sum() >= 8, band
+    assert float((band.upper - band.lower).max()) < width * scale
+    assert predictive_check(result).passed
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("profile", "unknown", "evaluations"),
     [("I", ALL, 50_000), ("II", ALL, 50_000), ("II", "nothing", 40_000), ("III", ALL, 50_000)],
 )
 def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
-    """Converged in some 100 steps; 95 % band, of nine places at most one is outside.
+    """Converged in some 100 steps.
 
     With the unknowns there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
     each of four ensembles, it makes 344 evaluations in place of 272.
@@ -156,45 +163,50 @@ def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
     result = infer_contour(measured, family="shape-free", rig=Rig(load_cell=CELL, unknown=unknown), rng=1)
     assert result.attrs["converged"], result.attrs["message"]
     assert result["sample_stats"].attrs["evaluations"] < evaluations
-    x = np.linspace(-0.6, 0.6, 9)
-    band = contour_band(result, x)
-    inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
-    assert inside.sum() >= 8
-    assert float((band.upper - band.lower).max()) < 0.02
-    assert predictive_check(result).passed
+    assert_in_band(result, truth, 0.02)
+
+
+OTHERS = {
+    "moment alone": "nothing",
+    "friction": only("friction"),
+    "drift": only("bias", "drift"),
+    "two pivots": only("base"),
+    "without events": ALL,
+    "SI": ALL,
+}
 
 
 @pytest.mark.slow
-def test_a_run_is_made_again_from_its_seed_and_has_units():
-    settings = SamplerSettings(ensembles=2, max_steps=20)
-    cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
-    measured = cell.measure(scan(Parabola(5.0, 0.05), rig=Rig(rod=SI), drive_step=0.05).record, rng=1)
-    one, other = (infer_contour(measured, family="shape-free", rng=1, settings=settings) for _ in range(2))
-    for name, draws in one["posterior"].data_vars.items():
-        np.testing.assert_array_equal(draws, other["posterior"][name])
-    units = {name: one["posterior"][name].attrs["units"] for name in ("r", "amplitude", "length_scale", "z_1", "q")}
-    assert units == {"r": "m", "amplitude": "1", "length_scale": "rad", "z_1": "1", "q": "m"}
+@pytest.mark.parametrize("what", OTHERS)
+def test_other_rigs(what):
+    rod, cell, scale = (SI, SI_CELL, SI.length) if what == "SI" else (Rod(), CELL, 1.0)
+    is_parabola = what in ("friction", "SI")
+    truth = Parabola(0.5 / scale, 0.5 * scale) if is_parabola else paper_profile("II", q=0.5)
+    bases = ((0.0, 0.0), (0.25, 0.0)) if what == "two pivots" else ((0.0, 0.0),)
+    friction = 0.2 if what == "friction" else 0.0
+    record = swept(truth, bases=bases, rod=rod, friction=friction)
+    measured = cell.measure(record, rng=2 if what == "without events" else 1)
+    if what == "moment alone":
+        measured = without(measured, "force_x", "force_y")
+    settings = SamplerSettings(events=what != "without events", max_steps=150 if what == "friction" else 20_000)
+    rig = Rig(load_cell=cell, unknown=OTHERS[what])
+    assert_in_band(infer_contour(measured, family="shape-free", rig=rig, rng=1, settings=settings), truth, 0.1, scale)
 
 
 @pytest.mark.slow
-def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
-    measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, rng=1)
+def test_what_goes_on_from_a_checkpoint_is_the_same_and_has_units(tmp_path):
+    measured = SI_CELL.measure(scan(Parabola(5.0, 0.05), rig=Rig(rod=SI), drive_step=0.05).record, rng=1)
 
     def run(steps, **options):
         settings = SamplerSettings(ensembles=2, block_steps=10, max_steps=steps)
-        return infer_contour(
-            measured,
-            family="shape-free",
-            rig=Rig(load_cell=CELL, unknown="nothing"),
-            rng=1,
-            settings=settings,
-            **options,
-        )
+        return infer_contour(measured, family="shape-free", rng=1, settings=settings, **options)["posterior"]
 
     run(10, checkpoint=tmp_path / "run")
     resumed, whole = run(20, checkpoint=tmp_path / "run"), run(20)
-    for name, draws in whole["posterior"].data_vars.items():
-        np.testing.assert_array_equal(draws, resumed["posterior"][name])
+    for name, draws in whole.data_vars.items():
+        np.testing.assert_array_equal(draws, resumed[name])
+    units = {name: whole[name].attrs["units"] for name in ("r", "amplitude", "length_scale", "z_1", "q")}
+    assert units == {"r": "m", "amplitude": "1", "length_scale": "rad", "z_1": "1", "q": "m"}
 
 
 def test_what_may_vanish_does_not_end_the_coordinates():
@@ -231,15 +243,6 @@ def test_time_that_ends_before_anything_possible_is_found_gives_what_the_prior_a
     assert ((kept["posterior"].q > 0.9) & (kept["posterior"].q < 0.95)).all()
 
 
-def test_coordinates_lead_back():
-    whitening = whitened(model_of())
-    size = whitening.mean.size
-    whitening = whitening.standardised(np.full(size, 0.1), np.diag(np.linspace(0.5, 1.5, size)))
-    there = np.hstack([whitening.middle[: whitening.bent], 0.3 * np.ones(whitening.middle.size - whitening.bent)])[None]
-    points, _ = whitening.parameters(there)
-    np.testing.assert_allclose(whitening.of(points), there, atol=1e-6)
-
-
 @pytest.mark.parametrize("bias", [0.0, 0.3])
 def test_a_zero_that_is_not_known_hides_no_snap_off(bias):
     """The same samples are loaded, and the snap-offs between the same samples, if all readings are shifted."""
@@ -249,43 +252,3 @@ def test_a_zero_that_is_not_known_hides_no_snap_off(bias):
     assert found.ends.all()
     loaded = (record.holding_moment != 0.0).values
     assert np.count_nonzero(found.loaded != loaded) <= 6  # just after first contact the noise hides the load
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("what", ["moment alone", "friction", "drift", "two pivots", "without events", "SI"])
-def test_other_rigs(what):
-    """The truth within the band of 95 % at eight of nine places."""
-    truth, cell, options, unknown = paper_profile("II", q=0.5), CELL, {}, ALL
-    record = scan(truth, drive_step=np.radians(2.0)).record
-    if what == "friction":
-        truth = Parabola(0.5, 0.5)
-        record = scan(truth, drive_step=np.radians(2.0), rig=Rig(unknown={"friction": 0.2})).record
-        options, unknown = {"settings": SamplerSettings(max_steps=150)}, only("friction")
-    if what == "drift":
-        unknown = only("bias", "drift")
-    if what == "two pivots":
-        other = scan(truth, drive_step=np.radians(2.0), base=(0.25, 0.0)).record
-        other["sweep"] = other.sweep + 2
-        record = xr.concat([record, other], "sample", combine_attrs="override")
-        unknown = only("base")
-    measured_with = 2 if what == "without events" else 1
-    if what == "without events":
-        options = {"settings": SamplerSettings(events=False)}
-    scale = 1.0
-    if what == "SI":
-        truth, scale = Parabola(0.5 / SI.length, 0.5 * SI.length), SI.length
-        record = scan(truth, rig=Rig(rod=SI), drive_step=np.radians(2.0)).record
-        cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
-    measured = cell.measure(record, rng=measured_with)
-    if what == "moment alone":
-        for name in ("force_x", "force_y"):
-            measured[name] = measured[name] * np.nan
-        unknown = "nothing"
-    rig = Rig(load_cell=cell, unknown=unknown)
-    result = infer_contour(measured, family="shape-free", rig=rig, rng=1, **options)
-    x = scale * np.linspace(-0.6, 0.6, 9)
-    band = contour_band(result, x)
-    inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
-    assert inside.sum() >= 8, band
-    assert float((band.upper - band.lower).max()) < 0.1 * scale
-    assert predictive_check(result).passed

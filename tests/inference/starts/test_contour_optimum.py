@@ -5,15 +5,14 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from helpers.contour_posteriors import CELL
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 TRUTH = {"a": 1.484, "q": 0.686, "x_c": -0.8774, "friction": 0.45}
 
 

@@ -3,29 +3,22 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from helpers.contour_posteriors import only
+from helpers.contour_posteriors import CELL, only
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.deadline import NEVER
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.modes import Modes
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 
-@pytest.fixture(scope="module")
-def searched():
-    cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    measured = cell.measure(scan(Parabola(0.6, q=0.5, x_c=0.05), drive_step=0.1).record, rng=1)
-    model = contour_problem(Experiment(measured, Rig(load_cell=cell, unknown=only("friction")))).model
-    return Modes(model, np.random.default_rng(1), NEVER)
-
-
-def test_an_optimum_is_known_that_lies_near_that_of_a_mode(searched):
+def test_an_optimum_is_known_that_lies_near_that_of_a_mode():
     """Even if the mode's proposal has moved away from it, as along a bent ridge."""
+    measured = CELL.measure(scan(Parabola(0.6, q=0.5, x_c=0.05), drive_step=0.1).record, rng=1)
+    model = contour_problem(Experiment(measured, Rig(load_cell=CELL, unknown=only("friction")))).model
+    searched = Modes(model, np.random.default_rng(1), NEVER)
     (mode,) = searched.found_by_search()
     spread = mode.proposal.root.diagonal()
     away = replace(mode.proposal, mean=mode.proposal.mean + 100.0 * spread)

@@ -45,6 +45,17 @@ def mirrored(contour):
     return type(contour)(**values)
 
 
+def integrated(state, curvature, **options):
+    """x, y, slope and curvature of the rod from the pivot to the contact, from the drive angle and loads of a state."""
+    drive_angle, moment, force_x, force_y, arclength = state[5:10]
+
+    def slope(_s, z):
+        return [np.cos(z[2]), np.sin(z[2]), z[3], force_y * np.cos(z[2]) - force_x * np.sin(z[2])]
+
+    start = [0.0, 0.0, drive_angle, curvature - moment]
+    return solve_ivp(slope, (0.0, arclength), start, rtol=RTOL, atol=ATOL, **options).y
+
+
 @pytest.mark.parametrize("curvature", [-0.8, 0.05, 0.6])
 @pytest.mark.parametrize("name", CONTOURS)
 @pytest.mark.parametrize(("backward", "friction"), [(False, 0.0), (True, 0.3)])
@@ -55,14 +66,9 @@ def test_states_satisfy_the_integrated_equations(name, curvature, backward, fric
     states = paths.sampled[paths.sampled[..., 0] != NONE]
     own = -curvature if backward else curvature
     for state in states[:: max(1, len(states) // 8)]:
-        phase, _, x, y, alpha, drive_angle, moment, force_x, force_y, arclength, tip_angle = state[:11]
+        phase, _, x, y, alpha, _, _, force_x, force_y, arclength, tip_angle = state[:11]
         gamma, sticks = state[12:14]
-
-        def slope(_s, z, force_x=force_x, force_y=force_y):
-            return [np.cos(z[2]), np.sin(z[2]), z[3], force_y * np.cos(z[2]) - force_x * np.sin(z[2])]
-
-        start = [0.0, 0.0, drive_angle, own - moment]
-        end = solve_ivp(slope, (0.0, arclength), start, method="DOP853", rtol=RTOL, atol=ATOL).y[:, -1]
+        end = integrated(state, own, method="DOP853")[:, -1]
         assert end == pytest.approx([x, y, tip_angle, own], abs=1e-10)
         assert np.arctan2(-force_x, force_y) == pytest.approx(alpha + gamma, abs=1e-12)
         assert abs(gamma) <= np.arctan(friction) if sticks else abs(gamma) == np.arctan(friction)
@@ -132,15 +138,9 @@ def test_a_rod_curved_toward_the_object_is_outside_of_it(name, curvature, fricti
     for i in there[:8]:
         states = paths.sampled[i][paths.sampled[i, :, 0] != NONE]
         for state in states[:: max(1, len(states) // 4)]:
-            drive_angle, moment, force_x, force_y, arclength = state[5:10]
-
-            def slope(_s, z, force_x=force_x, force_y=force_y):
-                return [np.cos(z[2]), np.sin(z[2]), z[3], force_y * np.cos(z[2]) - force_x * np.sin(z[2])]
-
-            start = [0.0, 0.0, drive_angle, curvature - moment]
-            loaded = solve_ivp(slope, (0.0, arclength), start, rtol=RTOL, atol=ATOL, max_step=0.02).y
+            loaded = integrated(state, curvature, max_step=0.02)
             x, y, phi = loaded[:3, -1]
-            free = np.linspace(0.0, 1.0 - arclength, 50)
+            free = np.linspace(0.0, 1.0 - state[9], 50)
             x = np.append(loaded[0], x + (np.sin(phi + curvature * free) - np.sin(phi)) / curvature)
             y = np.append(loaded[1], y - (np.cos(phi + curvature * free) - np.cos(phi)) / curvature)
             assert not np.any(_inside(CONTOURS[name], i, x, y))

@@ -63,9 +63,8 @@ def base_of(contact, force, friction, arclength, curvature, compliance, taper):
     return end[0], end[1], end[2] - compliance * end[3]
 
 
-@pytest.mark.parametrize("number", range(24))
-def test_states_satisfy_the_integrated_equations(number):
-    """From the contact and its force the rod ends at the base, where the drive has brought it."""
+def drawn(number):
+    """Contour, poses, and options of `carried`."""
     rng = np.random.default_rng(number)
     size, q, x_c = np.exp(rng.normal(0.0, 0.4)), rng.uniform(0.4, 0.8), rng.normal(0.0, 0.1)
     contour = [Parabola(size, q, x_c), Circle(0.4 * size, q, x_c), PowerLaw(size, 1.6, q, x_c)][number % 3]
@@ -74,9 +73,16 @@ def test_states_satisfy_the_integrated_equations(number):
     friction, compliance = rng.choice([0.0, 0.2]), rng.choice([0.0, 0.1])
     profile = TAPERED if number % 4 == 3 else None
     curvature = 0.0 if profile is not None else rng.choice([0.0, 0.4, -0.4])
+    return contour, poses, {"friction": friction, "compliance": compliance, "curvature": curvature, "profile": profile}
+
+
+@pytest.mark.parametrize("number", range(24))
+def test_states_satisfy_the_integrated_equations(number):
+    """From the contact and its force the rod ends at the base, where the drive has brought it."""
+    contour, poses, rig = drawn(number)
+    friction, compliance, curvature, profile = rig.values()
     whole = np.linalg.norm(poses[1] - poses[0])
     ways = np.linspace(0.0, whole, 25)
-    rig = {"friction": friction, "compliance": compliance, "curvature": curvature, "profile": profile}
     paths = carried(contour, poses, ways, **rig)
     states = paths.sampled[0]
     with np.errstate(invalid="ignore"):
@@ -100,14 +106,9 @@ def test_states_satisfy_the_integrated_equations(number):
 
 
 def test_enough_of_them_touch():
-    """Most of the drawn ones above have states to check."""
-    touched = 0
-    for number in range(24):
-        rng = np.random.default_rng(number)
-        size, q, x_c = np.exp(rng.normal(0.0, 0.4)), rng.uniform(0.4, 0.8), rng.normal(0.0, 0.1)
-        poses = np.array([[1.0, 0.0, 0.9], [-0.8, 0.0, 0.9]])
-        touched += carried(Parabola(size, q, x_c), poses).reach[0] == Reachability.TOUCHES
-    assert touched > 8
+    """Of the drawn ones above: they have states to check."""
+    found = (carried(contour, poses, **rig) for contour, poses, rig in map(drawn, range(24)))
+    assert sum(paths.reach[0] == Reachability.TOUCHES for paths in found) > 8
 
 
 @pytest.mark.parametrize("contour", [Parabola(0.5, 0.5), Circle(0.5, 0.6, 0.1), PowerLaw(1.0, 1.7, 0.5)])
@@ -267,4 +268,3 @@ def test_tapers_and_profiles_follow_the_same_equations_in_the_fast_mode():
     assert fast.snap_angle == pytest.approx(exact.snap_angle, abs=2e-6)
     inside = (exact.sampled[0, :, 0] != NONE) & (ways < exact.snap_angle[0] - 1e-3)
     np.testing.assert_allclose(fast.sampled[0, inside, 6:9], exact.sampled[0, inside, 6:9], atol=2e-3)
-    assert np.any(exact.sampled[0, :, 0] == TANGENTIAL) or np.any(exact.sampled[0, :, 0] == TIP)

@@ -5,9 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from helpers import integrated_step2
-from helpers.arc_sweeps import loaded_states
 from helpers.integration import ATOL, RTOL
-from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.contacts.contact_coordinates import (
     DRIVE_ANGLE,
@@ -23,8 +21,6 @@ from tactile_bayes.mechanics.elastica import (
     wrench_from_contact,
 )
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-
-CURVATURES = (-2.0, -0.7, -0.05, 0.05, 0.7, 2.0)
 
 
 class Arcs:
@@ -196,28 +192,6 @@ def test_a_straight_rod_is_the_limit():
 def test_wrenches_without_a_contact(drive_angle, moment, force, curvature):
     found = contact_from_wrench(drive_angle, moment, 0.0, force, side=1, rest_curvature=curvature)
     assert np.isnan(found[:5]).all()
-
-
-@pytest.mark.parametrize("curvature", CURVATURES)
-@pytest.mark.parametrize("contour", [Parabola, Circle, PowerLaw])
-@pytest.mark.parametrize(("backward", "friction"), [(False, 0.3), (True, 0.0)])
-def test_step2_gives_the_contacts_of_a_sweep_back(contour, curvature, backward, friction):
-    """Not where the tip points away from the force, ψ1 > π/2: the moment there vanishes at an earlier point too; and if
-    friction acts as stated."""
-    rng, count = np.random.default_rng(5), 20
-    sizes, q, x_c = np.exp(rng.normal(0.0, 0.5, count)), rng.uniform(0.2, 0.8, count), rng.normal(0.0, 0.15, count)
-    shape = contour(sizes, 1.6, q, x_c) if contour is PowerLaw else contour(sizes, q, x_c)
-    angles, delta = np.linspace(-1.0, 4.5, 56), np.arctan(friction)
-    _, states = loaded_states(shape, np.full(count, backward), curvature, friction, angles)
-    wrench, own = states.wrench, -curvature if backward else curvature
-    loads = wrench.drive_angle, wrench.holding_moment, wrench.force_x, wrench.force_y
-    found = contact_from_wrench(*loads, delta, side=1, rest_curvature=own)
-    right = np.array([states.x, states.y, states.slope_angle, wrench.contact_arclength])
-    inward = np.abs(np.arctan2(-wrench.force_x, wrench.force_y) - states.slope_angle - delta) < 1e-9
-    usual = inward & (wrench.tip_angle - states.slope_angle - delta < 0.5 * np.pi)
-    assert usual.sum() > 0.9 * inward.sum()
-    assert usual.sum() > 100
-    np.testing.assert_allclose(np.array(found[:4])[:, usual], right[:, usual], atol=1e-9)
 
 
 # --- Contact → wrench ---------------------------------------------------------------------------------------------

@@ -140,26 +140,23 @@ def test_a_traced_rod_has_a_profile():
 
 
 @pytest.mark.parametrize(
-    ("x", "y", "named"),
+    ("x", "y", "options", "named"),
     [
-        (S[:7], S[:7], ["7", "8"]),
-        (S, S[:10], ["11", "10"]),
-        ([*S[:10], math.nan], S, ["x"]),
-        (np.abs(S - 0.5), 0.0 * S, ["turn back", "order"]),
-        (np.append(S, S), np.append(0.0 * S, 0.0 * S + 0.3), ["turn back"]),
-        (0.0 * S, 0.0 * S, ["turn back"]),
-        (S[[0, 1, 2, 3, 4, 6, 5, 7, 8, 9, 10]], 0.0 * S, ["x[6]", "behind"]),
-        (np.linspace(0.0, 1.0, 40), 0.2 * (np.arange(40) % 2), ["rod"]),
+        (S[:7], S[:7], {}, ["7", "8"]),
+        (S, S[:10], {}, ["11", "10"]),
+        ([*S[:10], math.nan], S, {}, ["x"]),
+        (np.abs(S - 0.5), 0.0 * S, {}, ["turn back", "order"]),
+        (np.append(S, S), np.append(0.0 * S, 0.0 * S + 0.3), {}, ["turn back"]),
+        (0.0 * S, 0.0 * S, {}, ["turn back"]),
+        (S[[0, 1, 2, 3, 4, 6, 5, 7, 8, 9, 10]], 0.0 * S, {}, ["x[6]", "behind"]),
+        (np.linspace(0.0, 1.0, 40), 0.2 * (np.arange(40) % 2), {}, ["rod"]),
+        (S, S, {"scatter": -1.0}, ["scatter", -1.0]),
+        *((80.0 * S, 0.0 * S, {"length": length}, ["length"]) for length in (70.0, 130.0, np.nan)),
     ],
 )
-def test_points_of_no_rod_are_refused(x, y, named):
+def test_points_of_no_rod_are_refused(x, y, options, named):
     with refused(ParameterError, *named):
-        traced_rod(x, y)
-
-
-def test_a_scatter_that_is_none_is_refused():
-    with refused(ParameterError, scatter=-1.0):
-        traced_rod(S, S, scatter=-1.0)
+        traced_rod(x, y, **options)
 
 
 def test_few_points_of_known_scatter_need_no_terms_for_it():
@@ -214,13 +211,6 @@ def test_exact_points_of_a_part_give_the_whole():
     x, y = points_of(CURVATURES["spiral"], np.linspace(0.0, 0.8, 30))
     rod = traced_rod(x, y, length=80.0)
     np.testing.assert_allclose(rod.rest_curvature(S), 5.0 * S, atol=1e-6)
-
-
-@pytest.mark.parametrize("length", [70.0, 130.0, np.nan])
-def test_a_length_that_is_none_is_refused(length):
-    x, y = points_of(CURVATURES["arc"], S)
-    with refused(ParameterError, "length"):
-        traced_rod(x, y, length=length)
 
 
 def test_modes_hold_what_a_trace_leaves_open_of_deflections():
