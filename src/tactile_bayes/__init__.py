@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("contours", "datasets", "errors", "planning", "plotting")
+_MODULES = ("contours", "datasets", "errors", "plotting")
 _ROOMS = (
     "calibration",
     "comparison",
@@ -26,6 +26,7 @@ _ROOMS = (
     "load_cell",
     "mechanics",
     "paper_figures",
+    "planning",
     "record",
     "tasks",
     "uncertainty",
@@ -44,6 +45,7 @@ _HOMES = {
     "Translation": "sweep",
     "calibrate": "calibration.calibrate",
     "calibrate_rig": "inference.contour",
+    "causes": "assessment.causes",
     "check": "diagnostics.result_check",
     "compare_families": "comparison.families",
     "contour_band": "uncertainty.band",
@@ -86,6 +88,7 @@ if TYPE_CHECKING:
     from tactile_bayes import record as record
     from tactile_bayes import tasks as tasks
     from tactile_bayes import uncertainty as uncertainty
+    from tactile_bayes.assessment.causes import causes as causes
     from tactile_bayes.assessment.trust import trust as trust
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
     from tactile_bayes.comparison.families import compare_families as compare_families

@@ -25,6 +25,8 @@ NORMAL = {
     "gain and bias": cell(gain=GAIN, bias=(0.1, -0.2, 0.3)),
     "lever": cell(gain=GAIN, lever=(0.1, -0.2), relative_noise=0.2),
     "curve": cell(gain=GAIN, lever=(0.1, -0.2), moment_curve=(0.3, 0.1), bias=(0.1, -0.2, 0.3)),
+    "memory": cell(gain=GAIN, lever=(0.1, -0.2), lag=0.7, play=0.1, bias=(0.1, -0.2, 0.3)),
+    "lag, relative, drift": cell(lag=3.0, relative_noise=0.2, drift=WALK),
     "curve, relative": cell(moment_curve=(-0.2, 0.05), relative_noise=0.2),
     "relative noise": cell(relative_noise=0.2, gain=GAIN, bias=(0.1, -0.2, 0.3)),
     "random walk": cell(drift=WALK),
@@ -47,6 +49,12 @@ NORMAL = {
 def moments(sheet: LoadCell, loads, noise_scale=(1.0, 1.0, 1.0)):
     """Mean, shape (3n,), and covariance of readings of loads (n, 3), sample by sample, written out."""
     n = len(loads)
+    loads = np.array(loads, dtype=float)
+    for k in range(1, n if sheet.lag else 0):
+        loads[k] += np.exp(-1.0 / sheet.lag) * (loads[k - 1] - loads[k])
+    half, now = sheet.play * np.abs(loads).max(axis=0), np.zeros(3)
+    for k, c in np.ndindex(loads.shape if sheet.play else (0, 3)):
+        loads[k, c] = now[c] = min(max(now[c], loads[k, c] - half[c]), loads[k, c] + half[c])
     x, y = sheet.lever
     quadratic, cubic = sheet.moment_curve
     at_lever = [(moment - x * force_y + y * force_x, force_x, force_y) for moment, force_x, force_y in loads]
@@ -112,6 +120,8 @@ def load_cells(draw, frames=(None, "fixed", "turning")) -> LoadCell:
         gain=np.eye(3) + np.reshape(cross, (3, 3)),
         lever=draw(st.one_of(st.just((0.0, 0.0)), st.tuples(_signed, _signed))),
         moment_curve=draw(st.one_of(st.just((0.0, 0.0)), st.tuples(_signed, _signed))),
+        lag=draw(_sizes),
+        play=draw(_sizes),
         force_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         moment_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         force_resolution=draw(_sizes),

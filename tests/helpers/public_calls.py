@@ -433,6 +433,7 @@ def _summary_calls() -> dict[str, Call]:
         "implied_contacts": right(tb.uncertainty.implied_contacts, posterior=posterior(), draws=5),
         "contact_moments": right(tb.uncertainty.contact_moments, posterior=contacts_drawn()),
         "contact_region": right(tb.uncertainty.contact_region, posterior=contacts_drawn(), sample=20),
+        "causes": right(tb.causes, posterior=posterior()),
         "check": right(tb.check, posterior=posterior(), contacts=contacts()),
         "trust": right(tb.trust, run_or_posterior=posterior(), rng=1, replicates=0, assumptions=False, workers=1),
     }

@@ -38,4 +38,4 @@ def left_out():
     """Names of `tb` that no page lists."""
     modules = {module.__name__.removeprefix("tactile_bayes.") for module, _ in listed()}
     names = {name for module, names in listed() if module is tb for name in names}
-    return set(tb.__all__) - names - modules - {"__version__", "planning"}
+    return set(tb.__all__) - names - modules - {"__version__"}

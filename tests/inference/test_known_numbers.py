@@ -56,6 +56,8 @@ KNOWN = {
     "force_y_gain": 1.05,
     "moment_curve_quadratic": -0.01 / MOMENT,
     "moment_curve_cubic": 0.004 / MOMENT**2,
+    "lag": 1.3,
+    "play": 0.02,
     "suspension_compliance": 0.03 / MOMENT,
     "rest_curvature": 1.1,
     "rest_shape_1": 0.7,

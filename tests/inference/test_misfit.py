@@ -9,8 +9,8 @@ from tactile_bayes.comparison.verdict import NONE_FITS, verdict_on
 from tactile_bayes.inference.misfit import what_to_try
 
 OF_ROD = ["rest_curvature", "taper", "stem", "length"]
-SINGLE = ["friction", "backlash", "suspension_compliance", "taper", "stem", "length"]
-EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", *OF_ROD]
+SINGLE = ["friction", "backlash", "suspension_compliance", "lag", "play", "taper", "stem", "length"]
+EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "lag", "play", *OF_ROD]
 
 
 def suggested(unknowns, **stated):
@@ -33,7 +33,7 @@ def test_what_would_be_refused_is_not_suggested():
 
 
 def test_where_everything_was_inferred_only_the_family_is_left():
-    words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", *EVERY[-5:]])
+    words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", *EVERY[-7:]])
     assert "(--family shape-free, or compare)" in words
     assert "[unknown]" not in words
 

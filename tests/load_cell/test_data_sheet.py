@@ -47,6 +47,7 @@ def test_variances_are_of_every_channel_and_finite(sheet, has_them):
         ("drift", [0.1, "random_walk", RandomWalk, (0.1, 0.1)]),
         ("frame", ["rotating", "", 1, ["fixed"], np.array(["fixed"])]),
         ("moment_curve", [(1.0,), (np.nan, 0.0), "bent"]),
+        *((name, [-0.1, np.nan, np.inf, "1", (0.1,)]) for name in ("lag", "play")),
     ],
 )
 def test_what_no_load_cell_has_is_refused(name, values):

@@ -38,6 +38,8 @@ KNOWN = {
     "force_y_gain": 1.05,
     "moment_curve_quadratic": -0.01,
     "moment_curve_cubic": 0.004,
+    "lag": 1.3,
+    "play": 0.02,
     "suspension_compliance": 0.03,
     "rest_curvature": 0.11,
     "rest_shape_1": 0.7,
@@ -171,7 +173,7 @@ def test_a_drawn_rig_has_numbers_alone_and_is_drawn_from_the_distributions():
 def test_a_plan_has_known_numbers():
     rod, cell, contour, bases, known = scaled(0.1, 2e-4)
     noises = {"force_noise": 0.05 * rod.force_unit, "moment_noise": 0.02 * rod.moment_unit}
-    said = {**NOTHING, **{n: v for n, v in known.items() if n not in ("noise_scale", "taper_error")}}
+    said = {**NOTHING, **{n: v for n, v in known.items() if n not in ("noise_scale", "taper_error", "lag", "play")}}
     plan = Plan(
         contour, Rig(rod, replace(cell, **noises), said), drive=[Rotation(base, drive_step=0.1) for base in bases]
     )

@@ -13,6 +13,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.comparison.families import SHAPES
+from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import ParameterError, StudyError, TactileBayesError
 from tactile_bayes.inference.contour import sampled
@@ -20,8 +21,9 @@ from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.unknowns import belongs
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
-from tactile_bayes.record import rod_of
+from tactile_bayes.record import CHANNELS, rod_of
 from tactile_bayes.rig.parameters import STANDARD
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.rig.unknown import DEFAULT
@@ -29,7 +31,8 @@ from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
-_UNKNOWNS = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
+_MORE = ("base", "drift", "gain", "lag", "play", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
+_UNKNOWNS = (*STANDARD, *_MORE)
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 
 _EDGES = ("lower", "median", "upper")
@@ -123,6 +126,7 @@ def alternatives_of(experiment: Experiment) -> list[Alternative]:
             found.append(Alternative(f"{group} as stated", "fixed", _as_stated(experiment, members)))
         elif not any(belongs(name, group) for name in experiment.unknowns.known):
             found += _added(experiment, group)
+    found += _limited(experiment)
     families = [name for name in SHAPES if name != experiment.own_family.name]
     return [*found, *(Alternative(f"family {name}", "family", replace(experiment, family=name)) for name in families)]
 
@@ -148,6 +152,27 @@ def _added(experiment: Experiment, group: str) -> list[Alternative]:
     except ParameterError:  # it has the same effect as another unknown
         return []
     return [Alternative(label, "added", other)] if is_shown else []
+
+
+def stated_cell(experiment: Experiment) -> LoadCell:
+    """Return the load cell that is stated."""
+    return experiment.rig.load_cell or LoadCell.from_record(experiment.record) or LoadCell()
+
+
+def _limited(experiment: Experiment) -> list[Alternative]:
+    """Return the alternative in which readings that stay at their largest value are cut off there; none without."""
+    record, cell = experiment.record, stated_cell(experiment)
+    at_end = inspect_record(record, experiment.rig).samples["cut_off"].values
+    ends: dict[str, float] = {}
+    for index, name in enumerate(CHANNELS):
+        if at_end[:, index].any() and not np.isfinite(cell.limit[index]):
+            entry = f"{name.removeprefix('holding_').split('_')[0]}_range"
+            largest = float(f"{np.abs(record[name].values).max():.9g}")
+            ends[entry] = max(ends.get(entry, 0.0), largest)
+    if not ends:
+        return []
+    rig = replace(experiment.rig, load_cell=LoadCell.from_entries({**cell.entries(), **ends}))
+    return [Alternative("range inferred", "added", replace(experiment, rig=rig))]
 
 
 def _inferred(task: tuple[_Study, int]) -> _Outcome:

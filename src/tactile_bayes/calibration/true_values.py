@@ -11,7 +11,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import GROUPS, parameter_named
-from tactile_bayes.rig.stated import rod_with
+from tactile_bayes.rig.stated import rod_with, sensor_values
 
 _NOISES = ("force_noise", "moment_noise", "relative_noise")
 
@@ -31,7 +31,7 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
         "taper": rod.taper,
         "stem": rod.stem,
         "length": rod.length,
-        **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True)),
+        **sensor_values(cell),
         **known,
     }
     if rod.rest_curvature != stated.rest_curvature:

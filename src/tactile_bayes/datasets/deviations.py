@@ -14,7 +14,7 @@ from tactile_bayes.datasets.variations import Variation, variation_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.drawn import calibrated_at, unknown_of
-from tactile_bayes.rig.parameters import GROUPS, NEUTRAL, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, NEUTRAL, SENSOR, parameter_named
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.rig.rig_file import number_in, unit_of_unknown
 from tactile_bayes.rig.rig_prior import RigPrior
@@ -125,11 +125,11 @@ def _stated(values: Mapping[str, Floats], count: int) -> Stated:
 
     length, rigidity = column("rod.length", 1.0), column("rod.flexural_rigidity", 1.0)
     of_rod = {name: column(f"rod.{name}") for name in ("rest_curvature", "taper", "stem")}
-    curve = {name: column(f"load_cell.{name}") for name in GROUPS["moment_curve"]}
+    sensor = {name: column(f"load_cell.{name}") for name in SENSOR}
     gains = [np.abs(column(f"load_cell.gain_{name}_{name}", 1.0)) for name in CHANNELS]
     return Stated(
         ManyUnits(length, rigidity / length, rigidity / length**2),
-        {**NEUTRAL, **of_rod, **curve, "length": length},
+        {**NEUTRAL, **of_rod, **sensor, "length": length},
         [np.where(gain > 0.0, gain, 1.0) for gain in gains],
         column("rod.rest_curvature_deviation"),
     )
@@ -166,7 +166,7 @@ def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats
     for name, entry in _OF_CELL.items():
         if name in off:
             built[f"load_cell.{entry}"] = built.get(f"load_cell.{entry}", zero) + off[name]
-    for name in GROUPS["moment_curve"]:
+    for name in SENSOR:
         if name in off:
             built[f"load_cell.{name}"] = off[name]
     gains = dict(zip(CHANNELS, GROUPS["gain"], strict=True))

@@ -15,19 +15,21 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_optional, check_probability, refused
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.findings import Finding, contradiction, of_sweeps
+from tactile_bayes.diagnostics.likely_causes import likely_causes
 from tactile_bayes.diagnostics.predictive_check import Residuals, predictive_check, residuals_of
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.diagnostics.zeros import NOISE_FACTOR, OFF_ZERO, moved_zero, zero_off
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.misfit import GAUGE, is_inferred, what_to_try
-from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of, refuse_no_contour
+from tactile_bayes.inference.result import is_streamed, known_of, posterior_draws, record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides, drive_histories
 from tactile_bayes.record import CHANNELS, carried_sweeps
 from tactile_bayes.record.origin import column_entry
 from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.stated import sensor_values
 from tactile_bayes.tasks.documents import read_json
 
 _HOLDS, _NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
@@ -275,9 +277,9 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
 
 
 def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[Finding]:
-    """Report channels whose zero moved although no drift is stated or inferred."""
+    """Report channels whose zero moved although neither drift nor play is stated or inferred."""
     cell = LoadCell.from_record(record)
-    if cell is not None and cell.drift is not None:
+    if (cell is not None and cell.drift is not None) or "play" in _memory(posterior, record):
         return []
     p_values = dict(zip(found.channel.values.tolist(), found.same_bias_p_value.values.tolist(), strict=True))
     inferred = {name.removesuffix("_drift") for name in _inferred(posterior)}
@@ -307,7 +309,8 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> Finding:
         stretch=_stretch(posterior, worst),
         residual=f"{float(worst.worst_residual):+.2g}{unit}",
         result=result,
-        advice=what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0)),
+        advice=likely_causes(posterior)
+        or what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0)),
     )
 
 
@@ -353,13 +356,20 @@ def _contradictions(
 ) -> list[Finding]:
     """Report loads of single samples that contradict one another, under normal noise; outliers enlarge misfits."""
     cell = LoadCell.from_record(record) or LoadCell()
-    if contacts is None or math.isfinite(cell.degrees_of_freedom):
-        return []
+    if contacts is None or math.isfinite(cell.degrees_of_freedom) or _memory(posterior, record):
+        return []  # Step 2 knows of no memory
     chance = float(contacts.attrs.get("misfit_probability", math.nan))
     if not chance < CONTRADICTION or noisier > 0.75 * NOISE_FACTOR:  # more noise than stated explains it
         return []
     dragging = _dragging(posterior, float(contacts.attrs.get("axial_score", math.nan)))
     return [contradiction(chance, dragging)]
+
+
+def _memory(posterior: xr.DataTree, record: xr.Dataset) -> set[str]:
+    """Return the kinds of memory that are stated, known or inferred."""
+    known, cell = known_of(posterior.attrs), LoadCell.from_record(record) or LoadCell()
+    stated = {**sensor_values(cell), **known, **dict.fromkeys(_inferred(posterior), 1.0)}
+    return {name for name in ("lag", "play") if stated[name]}
 
 
 def _dragging(posterior: xr.DataTree, axial_score: float) -> str:

@@ -31,6 +31,7 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import expanded
 
+_STEPS_OF_A_VERDICT = 150  # of a posterior whose best parameters do not describe the record
 _PRIOR_SECONDS = 3.0  # time limit for draws from the prior [s] if time is limited, since a rod may reach few contours
 
 
@@ -257,12 +258,13 @@ def sampled(
                 f"the best fit is outside the priors, at {walk.beyond}: give wider ones, or check units, rod and base. "
                 + what_to_try([model.family.name], model.unknowns.names, friction=model.unknowns.friction)
             )
+        steps = min(settings.max_steps, _STEPS_OF_A_VERDICT) if walk.is_hopeless else settings.max_steps
         draws = sample(
             model.log_probability,
             walk.start,
             names=model.names,
             seed=seeds[1],
-            settings=replace(settings, max_seconds=deadline.seconds_left),
+            settings=replace(settings, max_seconds=deadline.seconds_left, max_steps=steps),
             progress=progress,
             checkpoint=checkpoint,
             coordinates=walk.coordinates,
@@ -270,6 +272,8 @@ def sampled(
         )
         tree = xr.DataTree.from_dict(drawn_groups(model, draws))
         tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
+        if walk.is_hopeless:
+            tree.attrs["message"] += "; few steps were made, since the best parameters leave what no noise explains"
         if "blocks" in tree.attrs:
             tree.attrs["message"] += f"; the likelihood takes {tree.attrs['blocks']}"
         if keep is not None:

@@ -31,11 +31,11 @@ class LoadCell(DataSheet):
 
     With the loads h (holding moment and support reaction, zero out of contact) at the true drive angle φ, it reads
 
-        y = gain · curve(lever(h)) + bias + drift + ε, cut off at ± range, rounded to steps of the resolution,
+        y = gain · curve(lever(memory(h))) + bias + drift + ε, cut off at ± range, rounded to steps of the resolution,
         drive_angle = φ + offset ± backlash/2 + noise, rounded in the same way,
 
-    where the lever changes the moment to m0 − x·force_y + y·force_x, the curve a moment M to M + a M² + b M³, and + is
-    that of forward motion, − of backward.
+    where the memory is a lag and play, the lever changes the moment to m0 − x·force_y + y·force_x, the curve a moment M
+    to M + a M² + b M³, and + is that of forward motion, − of backward.
 
     The default is an ideal sensor; every entry adds one flaw. Quantities are in the units of the record with which the
     cell is used: N and N m, or EI/L² and EI/L (a rod of 0.1 m and 1e-5 N m² has EI/L² = 1 mN, EI/L = 0.1 mN m). Entries
@@ -77,6 +77,11 @@ class LoadCell(DataSheet):
         whose reading is not in proportion to the moment, as a Hall sensor. Where the curve turns back, the sensor is
         saturated, and reads the same from there on. With counts in the column of the moment the gain is in counts per
         N m.
+    lag : float
+        Time constant of a lag of first order, in readings: that of a low-pass filter over the time between readings.
+    play : float
+        Play in each channel, which makes a loop of hysteresis: half of the loop's width over the channel's largest load
+        in a record. 0.001 for a good cell, 0.01 or more for a glued or printed one.
     force_range, moment_range : float
         Largest size of a reading, at which readings are cut off (with a resolution, at the last step in the range). A
         bridge is typically rated to twice the largest expected load.
@@ -248,7 +253,7 @@ class LoadCell(DataSheet):
         return measured(self, record, generator(rng))
 
     def corrected(self, record: xr.Dataset) -> xr.Dataset:
-        """Correct a record for the known errors of this cell: bias, gain, lever, offset and backlash.
+        """Correct a record for the known errors of this cell: bias, gain, lever, offset and backlash, not for memory.
 
         Use it for contact points, sample by sample. A likelihood takes the record as measured, since a corrected record
         no longer shows the ends of the range.

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats, RandomSource
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
+from tactile_bayes.load_cell.memory import remembered
 
 
 def corrupted_loads(
@@ -20,13 +21,14 @@ def corrupted_loads(
     discrepancy: Discrepancy | None = None,
     zeros: ArrayLike = 0.0,
 ) -> Floats:
-    """Simulate readings of loads: lever, gain and bias, drift, noise and discrepancy, then the range, then the steps.
+    """Simulate readings of loads: memory, lever, gain and bias, drift, noise and discrepancy, the range, and the steps.
 
     Shapes: loads (..., samples, 3), noise_scale (..., 3) → (..., samples, 3); `zeros` add to the bias.
     """
     noise = rng.standard_normal(loads.shape)
     if any(sheet.correlation):
         noise = noise @ np.linalg.cholesky(sheet.correlation_matrix).T
+    loads = remembered(loads, sheet.lag, sheet.play)
     readings = sheet.expected(loads) + np.asarray(zeros)
     if any(sheet.bias_uncertainty):
         readings += np.array(sheet.bias_uncertainty) * rng.standard_normal((*loads.shape[:-2], 1, 3))
@@ -38,9 +40,7 @@ def corrupted_loads(
     readings += sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale) * noise
     if discrepancy is not None:
         readings += discrepancy.draw(rng)
-    if math.isfinite(min(sheet.force_range, sheet.moment_range)):
-        readings = np.clip(readings, -sheet.limit, sheet.limit)
-    return rounded(readings, sheet.resolution)
+    return rounded(sheet.cut(readings), sheet.resolution)
 
 
 def corrupted_angles(sheet: DataSheet, angles: Floats, direction: ArrayLike, rng: RandomSource) -> Floats:

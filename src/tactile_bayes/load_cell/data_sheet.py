@@ -61,6 +61,8 @@ _CORRECTIONS = {
         for channel, unit in (("force", "N"), ("moment", "N m"), ("drive_angle", "rad"))
     },
     "relative_noise": "give a share, zero or positive",
+    "lag": "give a number of readings, zero or positive",
+    "play": "give a share of the largest load, zero or positive",
     **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), "give an angle [rad]"),
     **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), "give a positive number, inf for none"),
 }
@@ -82,6 +84,8 @@ class DataSheet:
     gain: tuple[Triple, Triple, Triple] = _IDENTITY
     lever: tuple[float, float] = (0.0, 0.0)
     moment_curve: tuple[float, float] = (0.0, 0.0)
+    lag: float = 0.0
+    play: float = 0.0
     force_range: float = math.inf
     moment_range: float = math.inf
     force_resolution: float = 0.0
@@ -205,8 +209,15 @@ class DataSheet:
 
     @property
     def straight(self) -> Self:
-        """The same without the curve of the moment."""
-        return replace(self, moment_curve=(0.0, 0.0)) if any(self.moment_curve) else self
+        """The same without the curve of the moment, and without memory."""
+        if not any((*self.moment_curve, self.lag, self.play)):
+            return self
+        return replace(self, moment_curve=(0.0, 0.0), lag=0.0, play=0.0)
+
+    def cut(self, readings: Floats) -> Floats:
+        """Return readings, shape (..., 3), cut off at the ends of the range."""
+        is_limited = math.isfinite(min(self.force_range, self.moment_range))
+        return np.clip(readings, -self.limit, self.limit) if is_limited else readings
 
     def expected(self, loads: Floats) -> Floats:
         """Readings of loads, shape (..., 3), without noise: lever, curve of the moment, gain and bias.

@@ -15,6 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.drift import Zero
+from tactile_bayes.load_cell.memory import remembered
 from tactile_bayes.record import CHANNELS
 
 _LOG_2PI = math.log(2.0 * math.pi)
@@ -43,6 +44,7 @@ def log_likelihood(
     if not present.size:
         batch = np.broadcast_shapes(scale.shape[:-1], loads.shape[:-2])
         return np.zeros((*batch, len(readings)) if pointwise else batch)
+    loads = remembered(loads, sheet.lag, sheet.play)
     expected = sheet.expected(loads)
     deviation = np.asarray(sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale))
     if present.size < len(CHANNELS):

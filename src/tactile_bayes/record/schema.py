@@ -103,6 +103,8 @@ LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
         "lever_y": "m",
         "moment_curve_quadratic": "1/N/m",
         "moment_curve_cubic": "1/N²/m²",
+        "lag": "1",
+        "play": "1",
         "force_range": "N",
         "moment_range": "N m",
         "force_resolution": "N",

@@ -34,6 +34,8 @@ _MEANINGS = {
     "lever_y": "y of the cell's reference point of the moment, from the pivot",
     "moment_curve_quadratic": "quadratic term of the moment's reading",
     "moment_curve_cubic": "cubic term of the moment's reading",
+    "lag": "lag of the readings",
+    "play": "half the width of the loop of hysteresis over the largest load",
     "gauge_x": "shift of the gauge in x",
     "gauge_y": "shift of the gauge in y",
     "backlash": "encoder reading in forward motion less that in backward motion",

@@ -17,7 +17,14 @@ from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
 from tactile_bayes.report.overlay import note_of, overlay_table
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
-from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence, trust_tables
+from tactile_bayes.report.trust import (
+    causes_table,
+    check_messages,
+    check_table,
+    contacts_messages,
+    convergence,
+    trust_tables,
+)
 from tactile_bayes.report.wording import PageTable, chance, fixed, percent, sentence, shown_as, spread
 
 
@@ -58,6 +65,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "convergence": convergence(findings),
         "check_messages": check_messages(findings),
         "check": check_table(findings),
+        "causes": causes_table(findings),
         "contacts": contacts_messages(findings),
         "readings": readings,
         "frame": {key: values[first] for key, values in readings.data["said"].items()},

@@ -136,6 +136,20 @@ def check_table(findings: Findings) -> PageTable | None:
     return PageTable("Misfit by channel: shares of predicted records that are at least as discrepant", heads, rows)
 
 
+def causes_table(findings: Findings) -> PageTable | None:
+    """Return what may be wrong where the record contradicts the model; None if nothing was tried."""
+    if "causes" not in findings.posterior.children:
+        return None
+    causes = findings.posterior["causes"].to_dataset()
+    rows = [
+        [str(name), fixed(float(gain), ".0f"), "yes" if describes else "no", str(remedy)]
+        for name, gain, describes, remedy in zip(
+            *(causes[column].values for column in ("cause", "log_evidence", "describes", "remedy")), strict=True
+        )
+    ]
+    return PageTable("What may be wrong", ["cause", "log-evidence", "describes the record", "infer with"], rows)
+
+
 def contacts_messages(findings: Findings) -> list[str]:
     """Return sentences on the statuses of single samples, and on the agreement of their four numbers with a rod."""
     contacts = findings.contacts

@@ -12,8 +12,9 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
-from tactile_bayes.load_cell.blocks import are_blocks, elapsed_in
+from tactile_bayes.load_cell.blocks import are_blocks, elapsed_in, readings_in
 from tactile_bayes.load_cell.measurement import measured
+from tactile_bayes.load_cell.memory import delay_of
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import CHANNELS, base_of_sample, frame_of, present_channels, rod_of, to_si, with_rod
@@ -58,6 +59,9 @@ def corrected(given: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) 
     fraction = elapsed_in(given)
     drifts = zip(CHANNELS, (rig.get(name, 0.0) for name in GROUPS["drift"]), strict=True)
     columns = {name: given[name] - drift * fraction for name, drift in drifts if drift}
+    if cell.lag:  # play stays, since what it hides is lost
+        later = float(delay_of(cell.lag)) / (readings_in(given) - 1)
+        columns |= {name: _ahead(columns.get(name, given[name]), fraction, later) for name in CHANNELS}
     columns |= {name: given[name] + shift for name, shift in _shifts(given, rig)}
     record = given.assign({name: values.assign_attrs(given[name].attrs) for name, values in columns.items()})
     rod = rod_of(given)
@@ -65,7 +69,7 @@ def corrected(given: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) 
         record = to_si(record, rod)
     return Corrected(
         with_rod(record, rod_with(rod, rig)),
-        cell,
+        replace(cell, lag=0.0, play=0.0),
         rig.get("friction", 0.0),
         rig.get("suspension_compliance", 0.0) * stiffer,
         str(given.attrs["units"]),
@@ -86,6 +90,11 @@ def measured_by(
     attrs |= {f"load_cell_{name}": value for name, value in stated.entries().items() if name != "frame"}
     missing = [name for name in CHANNELS if name not in present_channels(made)]
     return completed_record(table_of_columns(columns, attrs), rod, missing, frame_of(made))
+
+
+def _ahead(readings: xr.DataArray, elapsed: Floats, lag: float) -> xr.DataArray:
+    """Return readings as they are later by a lag, both as a share of the record: to first order those without it."""
+    return readings.copy(data=np.interp(elapsed + lag, elapsed, readings.values))
 
 
 def _shifts(record: xr.Dataset, rig: Mapping[str, float]) -> Iterator[tuple[str, Floats]]:

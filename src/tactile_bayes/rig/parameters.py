@@ -123,6 +123,16 @@ _ROWS = (
         of_moment=-2,
         hidden=_NO_MOMENT,
     ),
+    Parameter("lag", "lag of first order of all channels, in readings", "1", "half_normal", 1.0, None, 0.0),
+    Parameter(
+        "play",
+        "hysteresis of each channel: half the loop's width over its largest load",
+        "1",
+        "half_normal",
+        0.01,
+        None,
+        0.0,
+    ),
     Parameter(
         "suspension_compliance",
         "turn of the pivot per holding moment",
@@ -225,6 +235,8 @@ GROUPS = {
     "gauge": ("gauge_x", "gauge_y"),
     "discrepancy": ("discrepancy_scale", "discrepancy_length"),
 }
+# Parameters that replace what a load cell states of itself.
+SENSOR = (*GROUPS["moment_curve"], "lag", "play")
 # What is unknown of a real rig, unless it is said to be known.
 STANDARD = (
     "rigidity_scale",
@@ -237,7 +249,7 @@ STANDARD = (
     "taper_error",
 )
 # Parameters that are zero or positive, and may be zero.
-MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")
+MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem", "lag", "play")
 
 
 def parameter_named(name: str) -> Parameter | None:

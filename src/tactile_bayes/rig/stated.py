@@ -14,7 +14,7 @@ from tactile_bayes.distributions import Distribution, open_share
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, NEUTRAL, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, NEUTRAL, SENSOR, parameter_named
 
 _LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
@@ -41,7 +41,12 @@ def unit_of(name: str, rod: Units) -> Any:
 def stated_values(rod: Rod, cell: LoadCell) -> dict[str, float]:
     """Return the parameters of a rig that is as stated, except shifts of pivots, which are 0, and noises."""
     of_rod = {"rest_curvature": rod.mean_rest_curvature, "taper": rod.taper, "stem": rod.stem, "length": rod.length}
-    return {**NEUTRAL, **of_rod, **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True))}
+    return {**NEUTRAL, **of_rod, **sensor_values(cell)}
+
+
+def sensor_values(cell: LoadCell) -> dict[str, float]:
+    """Return what a load cell states of its curve and its memory, by parameter."""
+    return dict(zip(SENSOR, (*cell.moment_curve, cell.lag, cell.play), strict=True))
 
 
 class Stated(NamedTuple):
@@ -108,13 +113,15 @@ def cell_with(cell: LoadCell, rig: Mapping[str, float]) -> LoadCell:
         np.add(stated, [rig.get(name, 0.0) for name in GROUPS[what]]).tolist()
         for what, stated in (("bias", cell.bias), ("lever", cell.lever))
     )
-    curve = (rig.get(name, v) for name, v in zip(GROUPS["moment_curve"], cell.moment_curve, strict=True))
+    quadratic, cubic, lag, play = (rig.get(name, value) for name, value in sensor_values(cell).items())
     return replace(
         cell,
         gain=gain.tolist(),
         bias=bias,
         lever=lever,
-        moment_curve=(next(curve), next(curve)),
+        moment_curve=(quadratic, cubic),
+        lag=lag,
+        play=play,
         drive_angle_offset=cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
         drive_angle_backlash=cell.drive_angle_backlash + rig.get("backlash", 0.0),
     )

@@ -17,6 +17,7 @@ import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.arrays import Floats
+from tactile_bayes.assessment.causes import causes
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
@@ -82,6 +83,11 @@ class RunFolder(Folder):
         with replace_together(self.path, [*INFERENCE, *OF_POSTERIOR, *others]) as temporary:
             write_result(posterior, temporary / _POSTERIOR)
         self.files["posterior"] = self.path / _POSTERIOR
+
+    def replace_posterior(self, posterior: xr.DataTree) -> None:
+        """Write the posterior again, with a further group, and nothing else."""
+        with replace_together(self.path, [_POSTERIOR]) as temporary:
+            write_result(posterior, temporary / _POSTERIOR)
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -179,6 +185,10 @@ def _completed(
             edges = gap_if_any(result, probability)
         with folder.attempt("check", "summary.txt"):
             checked = check(result, contacts)
+            if any(finding.kind == "not described" for finding in checked.messages):
+                result["causes"] = xr.DataTree(causes(result, rng=0))
+                folder.replace_posterior(result)
+                checked = check(result, contacts)
         numbers = summary(result, probability, edges)
         found = () if checked is None else checked.messages
 

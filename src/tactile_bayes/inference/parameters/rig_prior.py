@@ -29,6 +29,8 @@ _SENSES = (
     "load_cell_gain",
     "load_cell_lever",
     "load_cell_moment_curve",
+    "load_cell_lag",
+    "load_cell_play",
     "load_cell_drive_angle_",
 )
 _NOISES = ("load_cell_drive_angle_noise", "load_cell_drive_angle_resolution")

@@ -15,13 +15,14 @@ from tactile_bayes.distributions import Distribution
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.blocks import elapsed_in
+from tactile_bayes.load_cell.blocks import elapsed_in, readings_in
 from tactile_bayes.load_cell.curve import curved
+from tactile_bayes.load_cell.memory import remembered
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
-from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, parameter_named
-from tactile_bayes.rig.stated import Stated, stated_values, unit_of
+from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, SENSOR, parameter_named
+from tactile_bayes.rig.stated import Stated, sensor_values, stated_values, unit_of
 from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ _OF_NOISE = (*GROUPS["discrepancy"], "noise_scale", "moment_noise", "force_noise
 _RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
 _RIG["backlash"] = "drive_angle_backlash"
 # Groups that change only what the load cell senses, not the path.
-_SENSED = ("bias", "drift", "gain", "lever", "moment_curve")
+_SENSED = ("bias", "drift", "gain", "lever", *SENSOR)
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class Unknowns:
     # Of each sample, linear from the first (−½) to the last (½).
     elapsed: Floats = field(default_factory=lambda: np.zeros(1))
     joint: RigPrior | None = None  # prior that a calibration found; `priors` are its marginals
-    curve: tuple[float, float] = (0.0, 0.0)  # stated one of the moment [L/EI, (L/EI)²]
+    sensor: Mapping[str, float] = field(default_factory=dict)  # stated values of `SENSOR`, dimensionless
+    readings: int = 1  # of the record, of which samples may be means
     pivots: int = 1
 
     @cached_property
@@ -70,6 +72,12 @@ class Unknowns:
     def friction(self) -> float:
         """Coulomb's coefficient, if it is known; 0 if it is inferred."""
         return self.known.get("friction", 0.0)
+
+    def longest_lag(self, priors: Mapping[str, Distribution]) -> float:
+        """Return the lag of the readings, if it is unknown its median in the prior and two standard deviations."""
+        if "lag" in self.names:
+            return float(priors["lag"].median() + 2.0 * priors["lag"].std())  # type: ignore[attr-defined]
+        return self.known.get("lag", self.sensor.get("lag", 0.0))
 
     @property
     def of_path(self) -> tuple[str, ...]:
@@ -120,15 +128,15 @@ class Unknowns:
         return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Apply unknown gains, levers and zeros, and the curve, to loads, shape (n, ..., 3) [EI/L, EI/L²], in place.
+        """Apply memory, unknown gains, levers and zeros, and the curve, in place, to loads of all samples in a row.
 
-        Zeros are given as readings, and enter as the loads that the cell reads as such without its own curve.
+        Shapes: loads (n, ..., samples, 3) [EI/L, EI/L²]. Zeros are given as readings, and enter as the loads that the
+        cell reads as such without its own curve.
         """
         values = self._with_known(values)
-        curve = [
-            self._dimensionless(values, name, stated)
-            for name, stated in zip(GROUPS["moment_curve"], self.curve, strict=True)
-        ]
+        *curve, lag, play = (self._dimensionless(values, name, self.sensor.get(name, 0.0)) for name in SENSOR)
+        if np.any(lag) or np.any(play):
+            loads[...] = remembered(loads, lag, play, np.diff(self.elapsed) * (self.readings - 1))
         is_bent = any(np.any(v) for v in curve)
         gains = [values.get(name) for name in GROUPS["gain"]]
         levers = [self._dimensionless(values, name) for name in GROUPS["lever"]]
@@ -200,7 +208,8 @@ def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool =
         deviating(known, names, rod, cell),
         elapsed_in(measured),
         joint,
-        cell.dimensionless(rod).moment_curve,
+        sensor_values(cell.dimensionless(rod)),
+        readings_in(measured),
         pivots,
     )
 

@@ -25,6 +25,9 @@ _LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations 
 # Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where a drive
 # has a history, along which a rod may slide back.
 _FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
+# Share of rods with friction beyond the first table up to which they are integrated: 7 % of draws from the default
+# prior, for which the second table of a traced rod would be a sixth of a start's time.
+_FEW = 0.1
 
 
 class RodTables:
@@ -43,7 +46,8 @@ class RodTables:
         slides = bool(np.any(friction != self._friction))
         is_cone = self._rod.diameter > 0.0 and bool(np.any(self._rod.taper + taper))
         varied = bool(np.any(taper)), bool(np.any(bend)), slides, is_cone and bool(np.any(length != 1.0))
-        is_strong = slides and not self._may_slide_back and bool(np.any(np.arctan(friction) > _FRICTION_ANGLES[0][1]))
+        share = np.mean(np.arctan(friction) > _FRICTION_ANGLES[0][1])
+        is_strong = slides and not self._may_slide_back and bool(share > _FEW)
         return self._table(profile, varied, False), self._table(profile, varied, True) if is_strong else NO_TABLE
 
     def _table(self, profile: Profile, varied: tuple[bool, bool, bool, bool], is_strong: bool) -> ForwardTable:

@@ -27,6 +27,7 @@ _PRIOR_DRAWS = 1000
 _CANDIDATES = 24
 _EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
 _MAX_LOG_DISTANCE = 12.0  # of the log of a parameter from its prior median in a search, in prior spreads
+_DECAY = 5.0  # lags after which a load that has ended is a hundredth of itself
 _MISSING_EVENT_RESIDUAL = 1000.0  # residual of an event that does not occur
 _MAX_RELATIVE_SD = 2.0  # of a contact normal to the contour, over the median one, for a fit
 # Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
@@ -46,6 +47,7 @@ class ContourOptimum(NamedTuple):
     cost: float  # robust least-squares cost
     fits: bool  # True if the assumed noise explains the residuals
     beyond: str = ""  # parameters that fit the record far better beyond the ends of their priors, as text; else empty
+    log_evidence: float = -np.inf  # Laplace's approximation, for the coarse noise, up to a constant of the record
 
 
 class Brackets(NamedTuple):
@@ -72,13 +74,14 @@ def event_brackets(model: ContourModel) -> Brackets:
     """Return the drive angles between which contact begins and ends; loads alone do not show how far events are off."""
     segments = model.likelihood.segments
     angle, of_sample = segments.angles_in_sweep_frame, segments.of_sample
-    rows = []
+    late, rows = round(_DECAY * model.unknowns.longest_lag(model.priors)), []
     for onset, snap_off in zip(model.found["onset"].values, model.found["snap_off"].values, strict=True):
         for ends, (before, after) in enumerate((onset, snap_off)):
             if before < 0 or after < 0 or of_sample[before] != of_sample[after] or angle[before] >= angle[after]:
                 continue  # there is no event, or the drive turns back
             width = _EVENT_TOLERANCE * (angle[after] - angle[before])
-            rows.append((of_sample[before], ends, angle[before], angle[after], width))
+            first = max(before - late, int(np.argmax(of_sample == of_sample[before])))
+            rows.append((of_sample[before], ends, min(angle[first], angle[before]), angle[after], width))
     found = {row[0] for row in rows}
     for segment, (before, first, last, after) in enumerate(segments.event_samples(model.certainly_loaded)):
         if segment not in found and before >= 0 and after >= 0:  # contact is too brief for its loads to show events
@@ -106,6 +109,20 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
     search = _Search(model, rng, deadline)
     for found in optima(search.residuals, search.starts(), *search.limits):
         yield search.complete(search.refine(found))
+
+
+def optimum_beside(
+    model: ContourModel, start: Mapping[str, float], rng: np.random.Generator, deadline: Deadline = NEVER
+) -> ContourOptimum:
+    """Return the better of the optima from Step 2's contacts and, for a contour of its family, from a start by name."""
+    search = _Search(model, rng, deadline)
+    best: Optimum | None = None
+    for found in optima(search.residuals, search.beside(start), *search.limits):
+        best = found if best is None or found.cost < best.cost else best
+        if best.fits:
+            break
+    assert best is not None  # a search begins at the start at least
+    return search.complete(search.refine(best))
 
 
 class _Search:
@@ -153,7 +170,7 @@ class _Search:
         late = np.full((len(points), self.brackets.low.size), _MISSING_EVENT_RESIDUAL)
         if allowed.any():
             loads, events = _continued(model, points[allowed])
-            expected = model.likelihood.load_cell.expected(loads)
+            expected = model.likelihood.load_cell.cut(model.likelihood.load_cell.expected(loads))
             # Zero loads are often closer to measured ones than wrong loads: without contact, residuals are constant.
             happens = ~np.isnan(self.brackets.at(events)).any(axis=1)
             missed = self.measured - expected[happens][..., model.present] / self.deviation
@@ -166,6 +183,16 @@ class _Search:
     def events_missed(self, coordinates: Floats) -> Floats:
         """Return the residuals of events, shape (n, events)."""
         return self.residuals(coordinates)[:, self.measured.size :]
+
+    def beside(self, start: Mapping[str, float]) -> Iterator[Floats]:
+        """Yield coordinates of the contour fitted to Step 2's contacts, and of a start, with medians for the rest."""
+        usual = np.median(self.candidates[:, : self.middle.size], axis=0)
+        rig = dict(zip(self.model.forward_parameters, usual.tolist(), strict=True))
+        for fitted in (contact_fit(self.model), contact_fit(self.model, rig)):
+            if fitted is not None:
+                yield self.coordinates.of(np.append(fitted, usual[fitted.size :]))
+        if fitted is None or set(self.model.family.parameters) <= set(start):
+            yield self.coordinates.of(np.array([start.get(name, value) for name, value in rig.items()]))
 
     def starts(self) -> Iterator[Floats]:
         """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""
@@ -211,7 +238,10 @@ class _Search:
         variances[len(model.names) - len(model.noise.of_discrepancy) :] = _DISCREPANCY_SPREAD**2
         covariance = np.diag(variances)
         covariance[:size, :size] = found.covariance * np.outer(narrow, narrow)
-        return ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, self._beyond(found))
+        sizes = np.linalg.slogdet(found.covariance).logabsdet - 2.0 * np.log(self.spread).sum()
+        log_evidence = float(0.5 * sizes - found.cost)
+        beyond = self._beyond(found)
+        return ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, beyond, log_evidence)
 
     def _beyond(self, found: Optimum) -> str:
         """Return the parameters that fit the record far better beyond the ends of their priors, as text."""

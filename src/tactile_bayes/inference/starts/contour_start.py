@@ -23,16 +23,18 @@ from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 from tactile_bayes.inference.starts.cloud import gather
-from tactile_bayes.inference.starts.contour_optimum import contact_fit, fitted_noise, optimum_of
+from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optimum_of
 from tactile_bayes.inference.starts.modes import Modes
 from tactile_bayes.inference.starts.pilot import standardise
-from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
 
 # Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
 # noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
+_FARTHEST = 5.0  # standard deviations at which residuals are clipped: a sample beside an event may be loaded or not
+_SMOOTH = 2.5  # root mean square of a channel's residuals, over the noise between neighbours, that no noise explains
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
 
 
@@ -43,6 +45,7 @@ class Walk(NamedTuple):
     coordinates: Coordinates
     log_evidence: float = -np.inf  # coarse one of the model, up to a constant of the number of parameters
     beyond: str = ""  # parameters that fit the record far better beyond the ends of their priors, as text
+    is_hopeless: bool = False  # whether what the best mode leaves is no noise
 
 
 def walk_of(
@@ -161,7 +164,8 @@ class _Start(NamedTuple):
             raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
         coordinates = common.with_proposal(proposal)
         log_evidence = float(logsumexp([part.log_mass for part in proposal.parts]))
-        return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
+        first = modes[0].optimum
+        return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, _is_hopeless(model, first))
 
 
 def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:
@@ -173,7 +177,20 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
     )
 
 
+def _is_hopeless(model: ContourModel, best: ContourOptimum) -> bool:
+    """Return True if the residuals of some channel are far larger than the noise between neighbouring ones."""
+    if best.fits or model.noise.of_discrepancy:
+        return False
+    left, noise = _residuals(model, best.point)[:, model.present], model.deviation[model.present]
+    rough = np.maximum([rough_noise(channel) for channel in left.T], noise)
+    return bool(np.any(np.sqrt(np.mean(np.minimum(np.abs(left / rough), _FARTHEST) ** 2, axis=0)) > _SMOOTH))
+
+
+def _residuals(model: ContourModel, point: Floats) -> Floats:
+    return np.asarray(model.likelihood.measured - model.likelihood.load_cell.expected(model.loads(point[None]))[0])
+
+
 def _misfit(model: ContourModel, point: Floats) -> float:
     """Return the mean square of the residuals at a point, over a coarse noise of the record, with outliers clipped."""
-    left = model.likelihood.measured - model.likelihood.load_cell.expected(model.loads(point[None]))[0]
-    return float(np.mean(np.minimum(np.abs(left / model.deviations)[:, model.present], 5.0) ** 2))
+    left = _residuals(model, point)
+    return float(np.mean(np.minimum(np.abs(left / model.deviations)[:, model.present], _FARTHEST) ** 2))

@@ -1,0 +1,101 @@
+"""Causes of a misfit: which other rigs and families describe a record that the model does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.assessment.assumptions import Alternative, alternatives_of, stated_cell
+from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.inference.contour_problem import contour_problem
+from tactile_bayes.inference.deadline import Deadline
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optimum_beside
+from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
+from tactile_bayes.record import rod_of
+from tactile_bayes.record.rig_entry import rig_entries
+from tactile_bayes.rig.stated import stated_values
+
+_SECONDS = 10.0  # time limit of each search [s], of which most take one or two
+
+
+def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
+    """Try what may be wrong with the rig or the family of a posterior that does not describe its record.
+
+    Each unknown of the rig that is not inferred is added, and each other family taken, and the most probable parameters
+    are sought again, from Step 2's contact points and from those of the posterior. Nothing is sampled.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "cause", the likeliest first: log_evidence above that of the model as it is, by Laplace's approximation for
+        the noise as it is estimated from the record; describes, 1 if the rest is no more than that noise; and remedy,
+        the entries of rig.toml, or the family. A cause that could not be tried is left out.
+
+    Raises
+    ------
+    InferenceError
+        If the tree is no such result.
+
+    See Also
+    --------
+    check : names the likeliest cause, if this is the group "causes" of the tree.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell, real = LoadCell(force_noise=0.02, moment_noise=0.008), Rig(unknown={"friction": 0.3})
+    >>> measured = cell.measure(scan(paper_profile("III", q=0.5), real, drive_step=0.05).record, rng=1)
+    >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=50)
+    >>> wrong = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=1, settings=quick)
+    >>> causes(wrong, rng=1).cause.values[0]
+    'friction'
+    """
+    experiment, seed = experiment_of(posterior), seed_sequence(rng)
+    draws = posterior_draws(posterior)
+    best = draws.isel(posterior["sample_stats"]["lp"].argmax(("chain", "draw")))
+    stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
+    start = {**stated, **{str(name): float(value) for name, value in best.data_vars.items()}}
+    own = _optimum(experiment, start, seed)
+    found = []
+    for each in alternatives_of(experiment):
+        if each.kind != "fixed":
+            try:
+                found.append((each, _optimum(each.experiment, start, seed)))
+            except TactileBayesError:  # what cannot be tried is no cause
+                continue
+    found.sort(key=lambda one: -one[1].log_evidence)
+    return xr.Dataset(
+        {
+            "log_evidence": ("cause", [one.log_evidence - own.log_evidence for _, one in found]),
+            "describes": ("cause", [int(one.fits) for _, one in found]),
+            "remedy": ("cause", [_remedy(each, experiment) for each, _ in found]),
+        },
+        coords={"cause": [each.name.replace(" inferred", "") for each, _ in found]},
+        attrs={"described": int(own.fits)},
+    )
+
+
+def _optimum(experiment: Experiment, start: dict[str, float], seed: np.random.SeedSequence) -> ContourOptimum:
+    model = contour_problem(experiment).model
+    return optimum_beside(model, start, np.random.default_rng(seed), Deadline.after(_SECONDS))
+
+
+def _remedy(alternative: Alternative, experiment: Experiment) -> str:
+    """Return the entries of rig.toml by which an alternative differs, or its family as an option."""
+    if alternative.kind == "family":
+        return f"--{alternative.name}"
+    tables = ((each.rig.entries, stated_cell(each).entries()) for each in (alternative.experiment, experiment))
+    pairs = zip(("unknown", "load_cell"), *tables, strict=True)
+    changed = ((name, {n: v for n, v in new.items() if old.get(n) != v}) for name, new, old in pairs)
+    return ", ".join(rig_entries(entries, name) for name, entries in changed if entries)

@@ -1,0 +1,99 @@
+"""Causes of a misfit: of each kind that is simulated the one that is named first, and what is said of several."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.contour_posteriors import CELL, swept
+from tactile_bayes.assessment.causes import causes
+from tactile_bayes.contours import Parabola
+from tactile_bayes.diagnostics.likely_causes import likely_causes
+from tactile_bayes.diagnostics.result_check import check
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.rig import Rig
+from tactile_bayes.sweep import scan
+
+BRIEF = SamplerSettings(ensembles=2, walkers=34, max_steps=50)
+SHAPE = Parabola(0.5, 0.5)
+
+
+def inferred(rig, seed=1, **assumed):
+    """Posterior of a record of a rig, by one that is as stated."""
+    record = rig.measure(scan(SHAPE, rig, drive_step=0.03).record, rng=seed)
+    return infer_contour(record, rig=Rig(load_cell=CELL, **assumed), rng=seed, settings=BRIEF)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("cause", "size"), [("taper", 0.15), ("lag", 1.5), ("play", 0.03), ("drift", 0.3), ("suspension_compliance", 0.15)]
+)
+def test_what_is_wrong_is_named_first_and_describes_the_record(cause, size, seed):
+    found = causes(inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0, cause: size}), seed), rng=seed)
+    assert found.cause.values[0] == cause
+    assert found.describes.values[0] == 1
+    assert found.log_evidence.values[0] > 5.0 + found.log_evidence.values[1]
+    assert f'{cause} = "default"' in str(found.remedy.values[0])
+
+
+@pytest.mark.slow
+def test_cut_off_readings_are_a_cause_of_which_the_range_is_the_cure():
+    record = swept(SHAPE, step=0.03)
+    largest = 0.6 * float(np.abs(record.force_y).max())
+    cut = record.assign(force_y=np.clip(record.force_y, -largest, largest))
+    found = causes(infer_contour(cut, rig=Rig(load_cell=CELL), rng=1, settings=BRIEF), rng=1)
+    assert found.cause.values[0] == "range"
+    assert f"force_range = {largest!r}"[:20] in str(found.remedy.values[0])
+
+
+def group(*rows):
+    names, gains, describes = zip(*rows, strict=True)
+    return xr.Dataset(
+        {
+            "log_evidence": ("cause", list(gains)),
+            "describes": ("cause", list(describes)),
+            "remedy": ("cause", [f"cure of {name}" for name in names]),
+        },
+        coords={"cause": list(names)},
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "named", "unnamed"),
+    [
+        (
+            [("a", 900.0, 1), ("b", 400.0, 0), ("c", 20.0, 1)],
+            ["cure of a", "Less likely", " c"],
+            ["cure of b", "cure of c"],
+        ),
+        ([("a", 900.0, 1), ("b", 897.0, 1)], ["cure of a", "cure of b", "gauge"], []),
+        ([("b", 900.0, 0), ("a", 400.0, 1)], ["cure of a"], ["cure of b"]),
+        ([("b", 900.0, 0), ("a", 400.0, 0)], ["Nothing", "cure of b"], ["cure of a"]),
+        ([("b", 1.0, 1)], [], ["cure of b"]),
+    ],
+    ids=["one", "two alike", "what describes", "none describes", "none is better"],
+)
+def test_what_is_said_of_causes(rows, named, unnamed):
+    tree = xr.DataTree.from_dict({"causes": group(*rows)})
+    said = likely_causes(tree)
+    assert all(word in said for word in named)
+    assert not any(word in said for word in unnamed)
+    assert likely_causes(xr.DataTree()) == ""
+
+
+@pytest.mark.slow
+def test_a_check_names_the_cause_in_place_of_a_list():
+    posterior = inferred(Rig(load_cell=CELL, unknown={"friction": 0.5}), unknown="nothing")
+    (finding,) = (one for one in check(posterior).messages if one.kind == "not described")
+    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    (with_cause,) = (one for one in check(posterior).messages if one.kind == "not described")
+    assert 'friction = "default"' in with_cause.details["advice"] != finding.details["advice"]
+
+
+@pytest.mark.slow
+def test_a_rod_is_no_cause_where_nothing_is_wrong():
+    posterior = inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0}))
+    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    assert posterior["causes"].attrs["described"] == 1
+    assert likely_causes(posterior) == ""
