@@ -1,5 +1,6 @@
 """The documentation: its code runs and prints what it says, and it names what there is."""
 
+import json
 import re
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from helpers.pages import DOCS, ROOT, agree, blocks, commands, matter, run
 from helpers.public_names import left_out, listed
 from tactile_bayes.cli import app
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS
+from tactile_bayes.rig.parameters import GROUPS
 
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
 FRONT = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "VISION", "SECURITY", "CODE_OF_CONDUCT")]
@@ -111,6 +113,18 @@ def test_the_columns_and_the_data_sheet_are_specified() -> None:
     page = TEXTS[DOCS / "formats.md"]
     assert [name for name in COLUMNS if f"`{name}`" not in page and f"`truth_{name}`" not in page] == []
     assert [name for name in LOAD_CELL_UNITS if f"`load_cell_{name}`" not in page] == []
+
+
+def test_the_table_of_unknowns_holds_the_defaults_that_the_command_prints() -> None:
+    printed = json.loads(call("rig", "--parameters", "--json").output)["parameters"]
+    rows = re.findall(r"^\| (`[a-z_`, ]+`) \|.*\| ([^|]*) \|$", TEXTS[DOCS / "howto" / "unknowns.md"], re.MULTILINE)
+    found: dict[str, list[str]] = {}
+    for names, default in rows:
+        for name in re.findall("[a-z_]+", names):
+            found |= dict.fromkeys(GROUPS.get(name, (name,)), default.split("; "))
+    assert found.pop("base") == ["normal, 0.01 L"]
+    assert found.keys() == {row["name"] for row in printed}
+    assert [row["name"] for row in printed if row["default"] not in found[row["name"]]] == []
 
 
 def commands_of(group: click.Group, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], click.Command]]:

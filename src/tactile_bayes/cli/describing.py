@@ -44,6 +44,18 @@ def rig(
     return Answer(_words(stated, said), lambda: _numbers(stated, said))
 
 
+# Units of the rod, by whether that is of a force, and powers of the moment's and the length's.
+_UNITS = {
+    (False, 0, 0): "",
+    (False, 0, 1): "L",
+    (False, 0, -1): "1/L",
+    (False, 1, 0): "EI/L",
+    (False, -1, 0): "L/EI",
+    (False, -2, 0): "(L/EI)²",
+    (True, 1, 0): "EI/L²",
+}
+
+
 def _row(parameter: Parameter) -> dict[str, Any]:
     return {
         "name": parameter.name,
@@ -88,20 +100,19 @@ def _bounds(row: dict[str, Any]) -> str:
 
 def _default(parameter: Parameter) -> str:
     """Return the default distribution as text; units are those of the rod, lengths L and moments EI/L."""
-    kind = parameter.default.replace("_", "-")
-    if parameter.unit == "N":
-        unit = " EI/L²"
+    kind, centre = parameter.default.replace("_", "-"), parameter.neutral
+    if "uniform" in kind:
+        kind += " from"
+    elif "half" not in kind and centre != 0.0:
+        kind += f" around {'the stated one' if centre is None else f'{centre:g}'},"
     else:
-        powers = {"EI/L": parameter.of_moment, "L": parameter.of_length}
-        parts = [_power(name if power > 0 else f"1/({name})", abs(power)) for name, power in powers.items() if power]
-        unit = "".join(f" {part}" for part in parts)
-    if parameter.unit == "rad" and not unit:
-        return f"{kind}, {math.degrees(parameter.width):.3g}°"
-    return f"{kind}, {'from ' if kind == 'log-uniform' else ''}{parameter.width:g}{unit}"
-
-
-def _power(name: str, power: int) -> str:
-    return name if power == 1 else f"({name})²"
+        kind += ","
+    if parameter.default == "log_normal":  # its width is that of the logarithm
+        return f"{kind} {parameter.width:g}"
+    if parameter.unit == "rad":
+        return f"{kind} {math.degrees(parameter.width):.3g}°"
+    unit = _UNITS[parameter.unit == "N", parameter.of_moment, parameter.of_length]
+    return f"{kind} {parameter.width:g} {unit}".strip()
 
 
 def _said(rig: Rig) -> dict[str, str]:
