@@ -23,18 +23,6 @@ def test_a_step_decays_and_a_ramp_is_late(lag):
     assert late == pytest.approx(delay_of(lag), rel=1e-9)
 
 
-@pytest.mark.parametrize("lag", [0.7, 12.0])
-def test_every_other_reading_of_a_broken_line_is_followed_as_if_all_were_there(lag):
-    """Between the samples that a likelihood takes of a long record, loads are straight."""
-    rng = np.random.default_rng(1)
-    corners = np.concatenate([[0], np.cumsum(rng.integers(1, 9, 40))])
-    loads = rng.normal(size=(1, corners.size, 3))
-    every = np.stack([np.interp(np.arange(corners[-1] + 1), corners, loads[0, :, c]) for c in range(3)], axis=-1)[None]
-    np.testing.assert_allclose(
-        remembered(loads, lag, 0.0, np.diff(corners)), remembered(every, lag, 0.0)[:, corners], atol=1e-12
-    )
-
-
 def test_play_makes_a_loop_as_wide_as_it_says_which_does_not_depend_on_the_steps():
     up_and_down = np.concatenate([np.linspace(0.0, 2.0, 201), np.linspace(2.0, -2.0, 401), np.linspace(-2.0, 2.0, 401)])
     read = remembered(of(up_and_down), 0.0, 0.05)[0, :, 0]

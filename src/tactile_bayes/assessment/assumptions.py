@@ -33,6 +33,7 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
 _MORE = ("base", "drift", "gain", "lag", "play", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
 _UNKNOWNS = (*STANDARD, *_MORE)
+_MEMORY = ("lag", "play")
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 
 _EDGES = ("lower", "median", "upper")
@@ -143,6 +144,8 @@ def _as_stated(experiment: Experiment, names: Collection[str]) -> Experiment:
 def _added(experiment: Experiment, group: str) -> list[Alternative]:
     """Return the alternative in which a parameter of the rig, or a group, is unknown; none if no record shows it."""
     names, label, other = experiment.unknowns.names, f"{group} inferred", experiment
+    if group in _MEMORY and "blocks" in experiment.record.attrs:  # the samples between are gone
+        return []
     if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
         label += " for rigidity_scale"
         other = _as_stated(other, ["rigidity_scale"])
@@ -167,7 +170,7 @@ def _limited(experiment: Experiment) -> list[Alternative]:
     for index, name in enumerate(CHANNELS):
         if at_end[:, index].any() and not np.isfinite(cell.limit[index]):
             entry = f"{name.removeprefix('holding_').split('_')[0]}_range"
-            largest = float(f"{np.abs(record[name].values).max():.9g}")
+            largest = float(f"{np.abs(record[name].values).max():.12g}")
             ends[entry] = max(ends.get(entry, 0.0), largest)
     if not ends:
         return []

@@ -18,14 +18,15 @@ from tactile_bayes.record import rod_of
 from tactile_bayes.record.rig_entry import rig_entries
 from tactile_bayes.rig.stated import stated_values
 
-_SECONDS = 10.0  # time limit of each search [s], of which most take one or two
+_SECONDS = 60.0  # time limit of all searches [s], most of which take one or two
 
 
 def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     """Try what may be wrong with the rig or the family of a posterior that does not describe its record.
 
     Each unknown of the rig that is not inferred is added, and each other family taken, and the most probable parameters
-    are sought again, from Step 2's contact points and from those of the posterior. Nothing is sampled.
+    are sought again, from Step 2's contact points and from those of the posterior. Nothing is sampled. It takes one or
+    two seconds for each, and a minute at most: then searches end with what they have.
 
     Parameters
     ----------
@@ -45,6 +46,8 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     ------
     InferenceError
         If the tree is no such result.
+    ParameterError
+        If a prior was a distribution of the caller's own, which the tree does not hold.
 
     See Also
     --------
@@ -66,12 +69,13 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     best = draws.isel(posterior["sample_stats"]["lp"].argmax(("chain", "draw")))
     stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
     start = {**stated, **{str(name): float(value) for name, value in best.data_vars.items()}}
-    own = _optimum(experiment, start, seed)
+    deadline = Deadline.after(_SECONDS)
+    own = _optimum(experiment, start, seed, deadline)
     found = []
     for each in alternatives_of(experiment):
         if each.kind != "fixed":
             try:
-                found.append((each, _optimum(each.experiment, start, seed)))
+                found.append((each, _optimum(each.experiment, start, seed, deadline)))
             except TactileBayesError:  # what cannot be tried is no cause
                 continue
     found.sort(key=lambda one: -one[1].log_evidence)
@@ -86,9 +90,10 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     )
 
 
-def _optimum(experiment: Experiment, start: dict[str, float], seed: np.random.SeedSequence) -> ContourOptimum:
-    model = contour_problem(experiment).model
-    return optimum_beside(model, start, np.random.default_rng(seed), Deadline.after(_SECONDS))
+def _optimum(
+    experiment: Experiment, start: dict[str, float], seed: np.random.SeedSequence, deadline: Deadline
+) -> ContourOptimum:
+    return optimum_beside(contour_problem(experiment).model, start, np.random.default_rng(seed), deadline)
 
 
 def _remedy(alternative: Alternative, experiment: Experiment) -> str:

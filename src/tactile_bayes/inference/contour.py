@@ -258,7 +258,8 @@ def sampled(
                 f"the best fit is outside the priors, at {walk.beyond}: give wider ones, or check units, rod and base. "
                 + what_to_try([model.family.name], model.unknowns.names, friction=model.unknowns.friction)
             )
-        steps = min(settings.max_steps, _STEPS_OF_A_VERDICT) if walk.is_hopeless else settings.max_steps
+        is_brief = walk.is_hopeless and settings.max_steps is None
+        steps = _STEPS_OF_A_VERDICT if is_brief else settings.max_steps
         draws = sample(
             model.log_probability,
             walk.start,
@@ -272,8 +273,8 @@ def sampled(
         )
         tree = xr.DataTree.from_dict(drawn_groups(model, draws))
         tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
-        if walk.is_hopeless:
-            tree.attrs["message"] += "; few steps were made, since the best parameters leave what no noise explains"
+        if is_brief and not draws.converged:
+            tree.attrs["message"] += "; no more are made where the best parameters leave what no noise explains"
         if "blocks" in tree.attrs:
             tree.attrs["message"] += f"; the likelihood takes {tree.attrs['blocks']}"
         if keep is not None:

@@ -65,11 +65,6 @@ def elapsed_in(record: xr.Dataset) -> Floats:
     return elapsed(record.sizes["sample"])
 
 
-def readings_in(record: xr.Dataset) -> int:
-    """Return the number of readings in a record, of which its samples may be means."""
-    return int(record["block_readings"].sum()) if are_blocks(record) else record.sizes["sample"]
-
-
 def elapsed(samples: int) -> Floats:
     """Return the position of each sample in a record, linear from the first (−½) to the last (½)."""
     return np.linspace(-0.5, 0.5, samples)

@@ -79,6 +79,7 @@ class LoadCell(DataSheet):
         N m.
     lag : float
         Time constant of a lag of first order, in readings: that of a low-pass filter over the time between readings.
+        Memory runs on from one sweep of a record to the next.
     play : float
         Play in each channel, which makes a loop of hysteresis: half of the loop's width over the channel's largest load
         in a record. 0.001 for a good cell, 0.01 or more for a glued or printed one.

@@ -16,35 +16,29 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 
 
-def remembered(loads: Floats, lag: Any, play: Any, readings: Floats | None = None) -> Floats:
+def remembered(loads: Floats, lag: Any, play: Any) -> Floats:
     """Return loads, shape (n, ..., samples, 3), as a sensor with memory reads them: lag, then play.
 
-    Lags [readings] and plays, shares of the largest load of each channel, are numbers or have the shape (n,).
-    `readings` are those from each sample to the next, shape (samples − 1,); by default one.
+    Lags [samples] and plays, shares of the largest load of each channel, are numbers or have the shape (n,).
     """
     lag, play = (np.reshape(value, (-1, *(1,) * (loads.ndim - 2))) for value in (lag, play))
     if np.any(lag):
-        loads = _delayed(loads, lag, np.ones(loads.shape[-2] - 1) if readings is None else readings)
+        loads = _delayed(loads, lag)
     return _loose(loads, play * np.abs(loads).max(axis=-2)) if np.any(play) else loads
 
 
-def delay_of(lag: Any) -> Any:
-    """Return by how many readings a steady change is read late."""
+def delay_of(lag: float) -> float:
+    """Return by how many samples a steady change is read late."""
     with np.errstate(divide="ignore", over="ignore"):
-        return 1.0 / np.expm1(1.0 / np.asarray(lag, dtype=float))
+        return float(1.0 / np.expm1(1.0 / np.float64(lag)))
 
 
-def _delayed(loads: Floats, lag: Floats, readings: Floats) -> Floats:
-    """Return the response of a lag to loads that are straight from sample to sample."""
-    out = np.empty_like(loads)
-    out[..., 0, :] = loads[..., 0, :]
-    behind = np.zeros_like(loads[..., 0, :])  # input less output
+def _delayed(loads: Floats, lag: Floats) -> Floats:
     with np.errstate(divide="ignore"):
-        for k, step in enumerate(readings, start=1):
-            kept = np.exp(-step / lag)
-            rise = (loads[..., k, :] - loads[..., k - 1, :]) * (delay_of(lag) / step)
-            behind = kept * behind + (1.0 - kept) * rise
-            out[..., k, :] = loads[..., k, :] - behind
+        left = np.exp(-1.0 / lag)
+    out = loads.copy()
+    for k in range(1, loads.shape[-2]):
+        out[..., k, :] += left * (out[..., k - 1, :] - loads[..., k, :])
     return out
 
 

@@ -135,7 +135,7 @@ class Plan:
 
     def certain(self, record: xr.Dataset) -> xr.Dataset:
         """Return an ideal record as the load cell reads it without random errors."""
-        certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "frame")})
+        certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "lag", "play", "frame")})
         return replace(self.rig, load_cell=certain).measure(record, rng=0)
 
     def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:

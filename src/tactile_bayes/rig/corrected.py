@@ -12,7 +12,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
-from tactile_bayes.load_cell.blocks import are_blocks, elapsed_in, readings_in
+from tactile_bayes.load_cell.blocks import are_blocks, elapsed_in
 from tactile_bayes.load_cell.measurement import measured
 from tactile_bayes.load_cell.memory import delay_of
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -59,8 +59,8 @@ def corrected(given: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) 
     fraction = elapsed_in(given)
     drifts = zip(CHANNELS, (rig.get(name, 0.0) for name in GROUPS["drift"]), strict=True)
     columns = {name: given[name] - drift * fraction for name, drift in drifts if drift}
-    if cell.lag:  # play stays, since what it hides is lost
-        later = float(delay_of(cell.lag)) / (readings_in(given) - 1)
+    if cell.lag and given.sizes["sample"] > 1:  # play stays, since what it hides is lost
+        later = delay_of(cell.lag) / (given.sizes["sample"] - 1)
         columns |= {name: _ahead(columns.get(name, given[name]), fraction, later) for name in CHANNELS}
     columns |= {name: given[name] + shift for name, shift in _shifts(given, rig)}
     record = given.assign({name: values.assign_attrs(given[name].attrs) for name, values in columns.items()})

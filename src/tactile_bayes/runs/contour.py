@@ -185,7 +185,8 @@ def _completed(
             edges = gap_if_any(result, probability)
         with folder.attempt("check", "summary.txt"):
             checked = check(result, contacts)
-            if any(finding.kind == "not described" for finding in checked.messages):
+        if checked is not None and any(finding.kind == "not described" for finding in checked.messages):
+            with folder.attempt("causes", "causes"):
                 result["causes"] = xr.DataTree(causes(result, rng=0))
                 folder.replace_posterior(result)
                 checked = check(result, contacts)

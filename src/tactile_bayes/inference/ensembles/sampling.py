@@ -192,7 +192,7 @@ class _Run:
 
     def advance(self) -> None:
         """Make the steps up to the next diagnosis, block by block."""
-        self.due = min(self.due, self.settings.max_steps)
+        self.due = min(self.due, self.settings.most_steps)
         while self.steps < self.due and not (self.is_late or self.ending):
             steps = min(self.settings.block_steps, self.due - self.steps)
             block = make_block(self.density, moves_in(self.coordinates), self.state.last, steps, self.deadline)
@@ -211,13 +211,13 @@ class _Run:
         self.diagnosis = found = Diagnosis(self.state.half.samples)
         if not self.ending:
             enough = found.satisfies(settings.max_r_hat, settings.min_ess)
-            spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.max_steps else ""
+            spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.most_steps else ""
             self.ending = _CONVERGED if enough and not np.any(self.state.lost()) else spent
         if self.stored is not None and self.ending not in ("", _INTERRUPTED):
             self.stored.write(self.state, self.seconds, is_end=True)
         if self.progress is not None:
             worst = float(found.r_hat[found.worst_r_hat]), float(found.ess[found.worst_ess])
-            self.progress(Progress(self.steps, settings.max_steps, *worst, self.seconds))
+            self.progress(Progress(self.steps, settings.most_steps, *worst, self.seconds))
         if self.steps == next_diagnosis(self.steps - 1, settings.block_steps):  # not where a budget ended
             self.state = self.state.recovered()
         self.due = next_diagnosis(self.steps, settings.block_steps)

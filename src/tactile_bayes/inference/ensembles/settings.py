@@ -9,6 +9,7 @@ from tactile_bayes.checks import check_number, check_optional, check_positive, c
 from tactile_bayes.errors import ParameterError
 
 _MOST = 10**9  # largest number of ensembles, walkers and steps
+_MOST_STEPS = 20_000  # by default
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,9 @@ class SamplerSettings:
     min_ess : float
         Every parameter's effective sample size, in the bulk and in the tails, must reach this, and five for every
         walker: fewer would mean that walkers have not forgotten their starting points.
-    max_steps : int
-        Number of steps after which each ensemble stops, converged or not.
+    max_steps : int, optional
+        Number of steps after which each ensemble stops, converged or not. By default 20,000, and 150, as many as a
+        verdict needs, where the best parameters of a contour leave what no noise explains.
     max_seconds : float, optional
         Time limit of a posterior [s], counted from the call: the search for a start ends with its present step, and so
         do the ensembles, which make at least one step. A few seconds may come on top, more at the first posterior after
@@ -58,16 +60,15 @@ class SamplerSettings:
     block_steps: int = 50
     max_r_hat: float = 1.01
     min_ess: float = 1000.0
-    max_steps: int = 20_000
+    max_steps: int | None = None
     max_seconds: float | None = None
     events: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "events", check_switch("events", self.events))
         for name in ("block_steps", "max_steps"):
-            check_whole_number(
-                name, getattr(self, name), 1, f"give a whole number, at least 1 and at most {_MOST}", most=_MOST
-            )
+            if (number := getattr(self, name)) is not None or name == "block_steps":
+                check_whole_number(name, number, 1, f"give a whole number, at least 1 and at most {_MOST}", most=_MOST)
         correction = (
             "give a whole number of at least 2 (4 is better), since convergence is judged by comparing independent "
             "ensembles; walkers of one ensemble are not independent"
@@ -82,6 +83,11 @@ class SamplerSettings:
         check_positive("min_ess", self.min_ess)
         if self.max_seconds is not None:
             check_positive("max_seconds", self.max_seconds, "give a positive time [s], or None for no limit")
+
+    @property
+    def most_steps(self) -> int:
+        """Number of steps after which each ensemble stops."""
+        return _MOST_STEPS if self.max_steps is None else self.max_steps
 
     def walkers_for(self, parameters: int) -> int:
         """Return the number of walkers of each ensemble for a target of this many parameters."""

@@ -15,7 +15,7 @@ from tactile_bayes.distributions import Distribution
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.blocks import elapsed_in, readings_in
+from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.load_cell.memory import remembered
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -52,7 +52,6 @@ class Unknowns:
     elapsed: Floats = field(default_factory=lambda: np.zeros(1))
     joint: RigPrior | None = None  # prior that a calibration found; `priors` are its marginals
     sensor: Mapping[str, float] = field(default_factory=dict)  # stated values of `SENSOR`, dimensionless
-    readings: int = 1  # of the record, of which samples may be means
     pivots: int = 1
 
     @cached_property
@@ -72,6 +71,12 @@ class Unknowns:
     def friction(self) -> float:
         """Coulomb's coefficient, if it is known; 0 if it is inferred."""
         return self.known.get("friction", 0.0)
+
+    @property
+    def remember(self) -> bool:
+        """True if the load cell has a lag or play, or may have, so that a sample depends on all before it."""
+        stated = {**self.sensor, **self.known, **dict.fromkeys(self.names, 1.0)}
+        return bool(stated.get("lag") or stated.get("play"))
 
     def longest_lag(self, priors: Mapping[str, Distribution]) -> float:
         """Return the lag of the readings, if it is unknown its median in the prior and two standard deviations."""
@@ -136,7 +141,7 @@ class Unknowns:
         values = self._with_known(values)
         *curve, lag, play = (self._dimensionless(values, name, self.sensor.get(name, 0.0)) for name in SENSOR)
         if np.any(lag) or np.any(play):
-            loads[...] = remembered(loads, lag, play, np.diff(self.elapsed) * (self.readings - 1))
+            loads[...] = remembered(loads, lag, play)
         is_bent = any(np.any(v) for v in curve)
         gains = [values.get(name) for name in GROUPS["gain"]]
         levers = [self._dimensionless(values, name) for name in GROUPS["lever"]]
@@ -209,7 +214,6 @@ def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool =
         elapsed_in(measured),
         joint,
         sensor_values(cell.dimensionless(rod)),
-        readings_in(measured),
         pivots,
     )
 

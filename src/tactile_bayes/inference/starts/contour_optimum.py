@@ -74,7 +74,7 @@ def event_brackets(model: ContourModel) -> Brackets:
     """Return the drive angles between which contact begins and ends; loads alone do not show how far events are off."""
     segments = model.likelihood.segments
     angle, of_sample = segments.angles_in_sweep_frame, segments.of_sample
-    late, rows = round(_DECAY * model.unknowns.longest_lag(model.priors)), []
+    late, rows = int(min(_DECAY * model.unknowns.longest_lag(model.priors), len(angle))), []
     for onset, snap_off in zip(model.found["onset"].values, model.found["snap_off"].values, strict=True):
         for ends, (before, after) in enumerate((onset, snap_off)):
             if before < 0 or after < 0 or of_sample[before] != of_sample[after] or angle[before] >= angle[after]:
@@ -185,7 +185,8 @@ class _Search:
         return self.residuals(coordinates)[:, self.measured.size :]
 
     def beside(self, start: Mapping[str, float]) -> Iterator[Floats]:
-        """Yield coordinates of the contour fitted to Step 2's contacts, and of a start, with medians for the rest."""
+        """Yield coordinates of the contour fitted to Step 2's contacts, without and with the rig's medians, and of a
+        start, where medians stand for what it does not name."""
         usual = np.median(self.candidates[:, : self.middle.size], axis=0)
         rig = dict(zip(self.model.forward_parameters, usual.tolist(), strict=True))
         for fitted in (contact_fit(self.model), contact_fit(self.model, rig)):

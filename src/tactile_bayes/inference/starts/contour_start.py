@@ -179,15 +179,16 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
 
 def _is_hopeless(model: ContourModel, best: ContourOptimum) -> bool:
     """Return True if the residuals of some channel are far larger than the noise between neighbouring ones."""
-    if best.fits or model.noise.of_discrepancy:
-        return False
+    if best.fits or model.noise.of_discrepancy or model.noise.cell.drift is not None:
+        return False  # what wanders is no misfit
     left, noise = _residuals(model, best.point)[:, model.present], model.deviation[model.present]
     rough = np.maximum([rough_noise(channel) for channel in left.T], noise)
     return bool(np.any(np.sqrt(np.mean(np.minimum(np.abs(left / rough), _FARTHEST) ** 2, axis=0)) > _SMOOTH))
 
 
 def _residuals(model: ContourModel, point: Floats) -> Floats:
-    return np.asarray(model.likelihood.measured - model.likelihood.load_cell.expected(model.loads(point[None]))[0])
+    cell = model.likelihood.load_cell
+    return np.asarray(model.likelihood.measured - cell.cut(cell.expected(model.loads(point[None])))[0])
 
 
 def _misfit(model: ContourModel, point: Floats) -> float:
