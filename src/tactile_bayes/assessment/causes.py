@@ -18,7 +18,7 @@ from tactile_bayes.record import rod_of
 from tactile_bayes.record.rig_entry import rig_entries
 from tactile_bayes.rig.stated import stated_values
 
-_SECONDS = 60.0  # time limit of all searches [s], most of which take one or two
+_SECONDS = 120.0  # time limit of all searches [s], most of which take one or two
 
 
 def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
@@ -26,7 +26,7 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
 
     Each unknown of the rig that is not inferred is added, and each other family taken, and the most probable parameters
     are sought again, from Step 2's contact points and from those of the posterior. Nothing is sampled. It takes one or
-    two seconds for each, and a minute at most: then searches end with what they have.
+    two seconds for each, and two minutes at most: then searches end with what they have.
 
     Parameters
     ----------

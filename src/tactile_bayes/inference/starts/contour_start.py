@@ -179,8 +179,9 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
 
 def _is_hopeless(model: ContourModel, best: ContourOptimum) -> bool:
     """Return True if the residuals of some channel are far larger than the noise between neighbouring ones."""
-    if best.fits or model.noise.of_discrepancy or model.noise.cell.drift is not None:
-        return False  # what wanders is no misfit
+    cell = model.noise.cell
+    if best.fits or model.noise.of_discrepancy or cell.drift is not None or any(cell.bias_uncertainty):
+        return False  # what wanders, or is off by what is integrated out, is no misfit
     left, noise = _residuals(model, best.point)[:, model.present], model.deviation[model.present]
     rough = np.maximum([rough_noise(channel) for channel in left.T], noise)
     return bool(np.any(np.sqrt(np.mean(np.minimum(np.abs(left / rough), _FARTHEST) ** 2, axis=0)) > _SMOOTH))
