@@ -24,16 +24,15 @@ from tactile_bayes.inference.parameters.unknowns import belongs
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
 from tactile_bayes.record import CHANNELS, rod_of
-from tactile_bayes.rig.parameters import STANDARD
+from tactile_bayes.rig.parameters import MEMORY, STANDARD
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.rig.unknown import DEFAULT
 from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
-_MORE = ("base", "drift", "gain", "lag", "play", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
+_MORE = ("base", "drift", "gain", *MEMORY, "suspension_compliance", "rest_curvature", "taper", "stem", "length")
 _UNKNOWNS = (*STANDARD, *_MORE)
-_MEMORY = ("lag", "play")
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 
 _EDGES = ("lower", "median", "upper")
@@ -144,7 +143,7 @@ def _as_stated(experiment: Experiment, names: Collection[str]) -> Experiment:
 def _added(experiment: Experiment, group: str) -> list[Alternative]:
     """Return the alternative in which a parameter of the rig, or a group, is unknown; none if no record shows it."""
     names, label, other = experiment.unknowns.names, f"{group} inferred", experiment
-    if group in _MEMORY and "blocks" in experiment.record.attrs:  # the samples between are gone
+    if group in MEMORY and "blocks" in experiment.record.attrs:  # the samples between are gone
         return []
     if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
         label += " for rigidity_scale"

@@ -29,7 +29,7 @@ from tactile_bayes.record import CHANNELS, carried_sweeps
 from tactile_bayes.record.origin import column_entry
 from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.rig.parameters import GROUPS
-from tactile_bayes.rig.stated import sensor_values
+from tactile_bayes.rig.stated import memory_in, sensor_values
 from tactile_bayes.tasks.documents import read_json
 
 _HOLDS, _NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
@@ -367,9 +367,8 @@ def _contradictions(
 
 def _memory(posterior: xr.DataTree, record: xr.Dataset) -> set[str]:
     """Return the kinds of memory that are stated, known or inferred."""
-    known, cell = known_of(posterior.attrs), LoadCell.from_record(record) or LoadCell()
-    stated = {**sensor_values(cell), **known, **dict.fromkeys(_inferred(posterior), 1.0)}
-    return {name for name in ("lag", "play") if stated[name]}
+    stated = sensor_values(LoadCell.from_record(record) or LoadCell())
+    return memory_in(stated, known_of(posterior.attrs), dict.fromkeys(_inferred(posterior), True))
 
 
 def _dragging(posterior: xr.DataTree, axial_score: float) -> str:

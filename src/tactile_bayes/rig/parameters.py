@@ -235,8 +235,9 @@ GROUPS = {
     "gauge": ("gauge_x", "gauge_y"),
     "discrepancy": ("discrepancy_scale", "discrepancy_length"),
 }
-# Parameters that replace what a load cell states of itself.
-SENSOR = (*GROUPS["moment_curve"], "lag", "play")
+# Parameters of the memory of a load cell, and all that replace what it states of itself.
+MEMORY = ("lag", "play")
+SENSOR = (*GROUPS["moment_curve"], *MEMORY)
 # What is unknown of a real rig, unless it is said to be known.
 STANDARD = (
     "rigidity_scale",
@@ -249,7 +250,7 @@ STANDARD = (
     "taper_error",
 )
 # Parameters that are zero or positive, and may be zero.
-MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem", "lag", "play")
+MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem", *MEMORY)
 
 
 def parameter_named(name: str) -> Parameter | None:

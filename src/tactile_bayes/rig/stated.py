@@ -14,7 +14,7 @@ from tactile_bayes.distributions import Distribution, open_share
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, NEUTRAL, SENSOR, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, MEMORY, NEUTRAL, SENSOR, parameter_named
 
 _LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
@@ -47,6 +47,12 @@ def stated_values(rod: Rod, cell: LoadCell) -> dict[str, float]:
 def sensor_values(cell: LoadCell) -> dict[str, float]:
     """Return what a load cell states of its curve and its memory, by parameter."""
     return dict(zip(SENSOR, (*cell.moment_curve, cell.lag, cell.play), strict=True))
+
+
+def memory_in(*said: Mapping[str, Any]) -> set[str]:
+    """Return the kinds of memory that a load cell has or may have, by what is said of parameters, the last first."""
+    every = {name: value for each in said for name, value in each.items()}
+    return {name for name in MEMORY if every.get(name)}
 
 
 class Stated(NamedTuple):

@@ -22,7 +22,7 @@ from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import record_hash
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.rig.stated import sensor_values
+from tactile_bayes.rig.stated import memory_in, sensor_values
 from tactile_bayes.runs.contour import ContourRun, RunFolder, complete, file_of, origin_of
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
 from tactile_bayes.tasks import alone_in, refuse_replacing
@@ -228,8 +228,8 @@ class Watch:
     def _stride(self, record: xr.Dataset) -> int:
         """Return the least power of two by which a record is thinned to the largest number of samples."""
         cell = self._rig.load_cell or LoadCell.from_record(record)
-        memory = {**({} if cell is None else sensor_values(cell)), **self._rig.said}
-        if (cell is not None and cell.drift is not None) or memory.get("lag") or memory.get("play"):
+        drifts = cell is not None and cell.drift is not None
+        if drifts or memory_in({} if cell is None else sensor_values(cell), self._rig.said):
             return 1  # their steps are those from one sample to the next
         parts = -(-record.sizes["sample"] // self._most)
         return 1 << (parts - 1).bit_length()

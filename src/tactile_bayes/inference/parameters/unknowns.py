@@ -22,7 +22,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
 from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, SENSOR, parameter_named
-from tactile_bayes.rig.stated import Stated, sensor_values, stated_values, unit_of
+from tactile_bayes.rig.stated import Stated, memory_in, sensor_values, stated_values, unit_of
 from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
 if TYPE_CHECKING:
@@ -75,8 +75,7 @@ class Unknowns:
     @property
     def remember(self) -> bool:
         """True if the load cell has a lag or play, or may have, so that a sample depends on all before it."""
-        stated = {**self.sensor, **self.known, **dict.fromkeys(self.names, 1.0)}
-        return bool(stated.get("lag") or stated.get("play"))
+        return bool(memory_in(self.sensor, self.known, dict.fromkeys(self.names, True)))
 
     def longest_lag(self, priors: Mapping[str, Distribution]) -> float:
         """Return the lag of the readings, if it is unknown its median in the prior and two standard deviations."""

@@ -143,6 +143,7 @@ class _Search:
         self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
         for name, zero in _zeros(model).items():
             self.candidates[:, model.names.index(name)] = zero
+        self.usual = np.median(self.candidates[:, :size], axis=0)
         self.drawn = self.coordinates.of(self.candidates[:, :size])
         percentiles = np.quantile(self.drawn, [0.16, 0.84], axis=0)
         coarse = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
@@ -187,20 +188,18 @@ class _Search:
     def beside(self, start: Mapping[str, float]) -> Iterator[Floats]:
         """Yield coordinates of the contour fitted to Step 2's contacts, without and with the rig's medians, and of a
         start, where medians stand for what it does not name."""
-        usual = np.median(self.candidates[:, : self.middle.size], axis=0)
-        rig = dict(zip(self.model.forward_parameters, usual.tolist(), strict=True))
-        for fitted in (contact_fit(self.model), contact_fit(self.model, rig)):
+        rig = dict(zip(self.model.forward_parameters, self.usual.tolist(), strict=True))
+        for fitted in (self._at_contacts(), self._at_contacts(rig)):
             if fitted is not None:
-                yield self.coordinates.of(np.append(fitted, usual[fitted.size :]))
+                yield fitted
         if fitted is None or set(self.model.family.parameters) <= set(start):
             yield self.coordinates.of(np.array([start.get(name, value) for name, value in rig.items()]))
 
     def starts(self) -> Iterator[Floats]:
         """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""
-        fitted = contact_fit(self.model)
+        fitted = self._at_contacts()
         if fitted is not None:
-            rig = np.median(self.candidates[:, fitted.size : self.middle.size], axis=0)
-            yield self.coordinates.of(np.append(fitted, rig))
+            yield fitted
         parts = [self.drawn[block] for block in blocks(len(self.drawn), self.measured.size)]
         costs = np.concatenate([np.sum(np.minimum(np.abs(self.residuals(part)), 30.0), axis=1) for part in parts])
         for place in self.drawn[np.argsort(costs)[:_CANDIDATES]]:
@@ -208,6 +207,11 @@ class _Search:
                 yield descend(self.events_missed, place, self.middle, self.spread, deadline=self.deadline).point
             else:
                 yield place
+
+    def _at_contacts(self, found: Mapping[str, float] | None = None) -> Floats | None:
+        """Return coordinates of the contour of `contact_fit`, with the usual rig."""
+        fitted = contact_fit(self.model, found)
+        return None if fitted is None else self.coordinates.of(np.append(fitted, self.usual[fitted.size :]))
 
     def refine(self, found: Optimum) -> Optimum:
         """Return an optimum refined by searches from contacts of Step 2 with its rig, which often converges first."""
