@@ -10,7 +10,7 @@ from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.deadline import Deadline
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.inference.result import best_draw
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optimum_beside
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
@@ -65,10 +65,8 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     'friction'
     """
     experiment, seed = experiment_of(posterior), seed_sequence(rng)
-    draws = posterior_draws(posterior)
-    best = draws.isel(posterior["sample_stats"]["lp"].argmax(("chain", "draw")))
     stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
-    start = {**stated, **{str(name): float(value) for name, value in best.data_vars.items()}}
+    start = {**stated, **{str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}}
     deadline = Deadline.after(_SECONDS)
     own = _optimum(experiment, start, seed, deadline)
     found = []

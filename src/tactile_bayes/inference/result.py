@@ -90,6 +90,11 @@ def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
     return draws
 
 
+def best_draw(result: xr.DataTree) -> xr.Dataset:
+    """Return the most probable draw, which the rod can reach; the medians may be out of reach."""
+    return posterior_draws(result).isel(result["sample_stats"]["lp"].argmax(("chain", "draw")))
+
+
 def _posterior_group(result: xr.DataTree) -> xr.Dataset:
     if "posterior" not in result.children:
         raise InferenceError(f"this tree has no group 'posterior', only {', '.join(result.children) or 'nothing'}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.inference.result import best_draw, record_of
 from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
@@ -72,8 +72,7 @@ class Frames:
 def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Frames:
     """Return the rods of the most probable draw, with its rigidity, encoder, friction, suspension and pivots."""
     record = record_of(posterior)
-    best = posterior["sample_stats"]["lp"].argmax(("chain", "draw"))
-    draw = posterior_draws(posterior).isel(best)
+    draw = best_draw(posterior)
     contour = contours_of(draw, posterior.attrs["family"])
     likelihood, unknowns = likelihood_of(posterior, record)
     rig = unknowns.rig({name: np.atleast_1d(draw[name].values) for name in unknowns.names})

@@ -25,7 +25,7 @@ from tactile_bayes.diagnostics.result_check import Check, check
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
-from tactile_bayes.inference.result import known_of, posterior_draws, record_of, write_result
+from tactile_bayes.inference.result import best_draw, known_of, posterior_draws, record_of, write_result
 from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.plotting.maps import set_below
@@ -273,8 +273,7 @@ class _Figures:
     @cached_property
     def fitted(self) -> Scan:
         """A scan of the most probable contour."""
-        best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # the medians may be out of reach
-        draw, attrs = self.draws.isel(best), self.result.attrs
+        draw, attrs = best_draw(self.result), self.result.attrs
         inferred = [name for name in read_json(attrs["nuisances"], "nuisances") if name in draw]
         found = {**known_of(attrs), **{name: float(draw[name]) for name in inferred}}
         if self.measured.attrs["units"] == "dimensionless":
