@@ -13,6 +13,7 @@ from tactile_bayes.diagnostics.likely_causes import likely_causes
 from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.result import read_result, write_result
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
@@ -47,6 +48,21 @@ def test_cut_off_readings_are_a_cause_of_which_the_range_is_the_cure():
     found = causes(infer_contour(cut, rig=Rig(load_cell=CELL), rng=1, settings=BRIEF), rng=1)
     assert found.cause.values[0] == "range"
     assert f"force_range = {largest:.9g}" in str(found.remedy.values[0])
+
+
+@pytest.mark.slow
+def test_a_column_that_is_read_with_another_sign_is_named_and_nothing_else_is_tried(tmp_path):
+    record = swept(SHAPE, step=0.03)
+    record["force_x"] = -record["force_x"]
+    posterior = infer_contour(CELL.measure(record, rng=1), rig=Rig(load_cell=CELL), rng=1, settings=BRIEF)
+    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    write_result(posterior, tmp_path / "posterior.nc")
+    read = read_result(tmp_path / "posterior.nc")
+    assert read["causes"].sizes["cause"] == 0
+    first = check(read).messages[0]
+    assert first.kind == "not described"
+    assert first.details["advice"].endswith(likely_causes(read))
+    assert "force_x had the other sign" in likely_causes(read)
 
 
 def group(*rows):

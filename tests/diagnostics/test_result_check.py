@@ -45,7 +45,7 @@ def test_of_a_good_result_all_is_well():
     found = check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
     assert kinds(found) == ["all is well"]
     assert found.is_well
-    (message,) = found.messages
+    message = found.messages[0]
     assert float(message.details["p_value"]) == pytest.approx(float(found.predictive.overall_p_value), rel=0.1)
     for other in (copy.deepcopy(message), pickle.loads(pickle.dumps(message))):
         assert (str(other), other.kind, other.details) == (str(message), message.kind, message.details)
@@ -128,6 +128,16 @@ def test_what_the_prior_forbids_and_what_it_says_alone():
     assert found.messages[1].details["names"] == "x_c"
     near = {**far, "rigidity_scale": rng.normal(1.0, 0.01, (4, 250))}
     assert kinds(check(changed(tree, "posterior", noise_scale=noise, **near))) == ["all is well", "set by the prior"]
+
+
+def test_a_zero_that_was_not_tared_is_ordinary_where_the_record_determines_it():
+    rng = np.random.default_rng(1)
+    prior = {"noise_scale": rng.lognormal(size=(1, 1000)), "force_y_bias": rng.normal(0.0, 0.01, (1, 1000))}
+    tree = changed(predicted(), "prior", **prior)
+    for width, wrong in ((2e-4, []), (4e-3, ["beyond the prior"])):
+        drawn = {"noise_scale": np.ones((4, 250)), "force_y_bias": rng.normal(0.08, width, (4, 250))}
+        found = kinds(check(changed(tree, "posterior", **drawn)))
+        assert [kind for kind in found if kind == "beyond the prior"] == wrong
 
 
 def test_a_zero_that_moved_is_told_unless_that_is_inferred_or_stated():

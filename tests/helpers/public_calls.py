@@ -427,6 +427,7 @@ def _summary_calls() -> dict[str, Call]:
     drawn = {"posterior": posterior(), "probability": 0.9}
     return {
         "contour_band": right(tb.contour_band, **drawn, x=[0.0, 0.1]),
+        "uncertainty_budget": right(tb.uncertainty.uncertainty_budget, **drawn),
         "normal_band": right(tb.uncertainty.normal_band, **drawn, x=[0.0, 0.1]),
         "predictive_interval": right(tb.uncertainty.predictive_interval, **drawn),
         "gap": right(tb.gap, **drawn, without_events=posterior()),

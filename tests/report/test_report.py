@@ -33,6 +33,7 @@ from helpers.report_pages import (
     comparison,
     hostile_run,
 )
+from tactile_bayes.diagnostics.findings import Finding
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.parameters.unknowns import unknowns_of
@@ -240,9 +241,9 @@ def test_a_contour_is_known_to_within_its_band_only_where_all_is_well(findings):
         checked = tb.diagnostics.Check(messages, well, predictive)
         return page_of(dataclasses.replace(findings, checked=checked), "run")
 
-    well = told(("All is well: the ensembles agree.",), True, passed=True)
+    well = told((Finding("all is well", drawn="ensembles agree", p_value="0.5"),), True, passed=True)
     doubtful = told(findings.checked.messages, False, passed=True)
-    rejected = told(("The family does not describe it.",), False, passed=False)
+    rejected = told((Finding("contradiction", chance="0", dragging=""),), False, passed=False)
     assert "known to within a 90\u00a0% band" in well["answer"]
     for page in (doubtful, rejected):
         assert "known to within" not in page["answer"]

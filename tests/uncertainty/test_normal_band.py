@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+import scipy.optimize
 
 from helpers.contour_posteriors import tree
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.uncertainty.normal_band import normal_band, normal_offsets
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.normal_band import normal_band
+from tactile_bayes.uncertainty.offsets import Feet, aligned, normal_offsets
 
 X = np.linspace(-0.4, 0.4, 33)
 
@@ -46,7 +49,7 @@ def test_the_points_found_are_on_the_contours_and_on_the_normals(family):
     )
     reference = contours.take(np.asarray(3))
     locus = reference.locate(reference.parameter_of_x(X))
-    offsets = normal_offsets(contours, locus.x, locus.y, locus.slope_angle)
+    offsets = normal_offsets(contours, locus)
     assert np.isfinite(offsets).all()
     np.testing.assert_allclose(offsets[3], 0.0, atol=1e-13)
     x = locus.x - offsets * np.sin(locus.slope_angle)
@@ -60,7 +63,7 @@ def test_a_simultaneous_band_holds_whole_contours(probability):
     locus = reference.locate(reference.parameter_of_x(X))
     draws = posterior["posterior"]
     contours = Parabola(*(draws[name].values.ravel() for name in ("a", "q", "x_c")))
-    offsets = normal_offsets(contours, locus.x, locus.y, locus.slope_angle)
+    offsets = normal_offsets(contours, locus)
 
     def share(simultaneous):
         band = normal_band(posterior, X, probability, simultaneous, reference=reference)
@@ -75,14 +78,14 @@ def test_the_normal_enters_the_object_where_it_meets_the_contour():
     """On a steep flank the line goes on to the other flank, which is not meant."""
     steep, wide = Parabola(20.0, q=0.0), Parabola(np.array([19.0]), q=0.0)
     locus = steep.locate(steep.parameter_of_x(np.array([-0.3, 0.3])))
-    offsets = normal_offsets(wide, locus.x, locus.y, locus.slope_angle)
+    offsets = normal_offsets(wide, locus)
     assert np.all((offsets < 0.0) & (offsets > -0.02))
 
 
 def test_an_endless_contour_is_met_far_away():
     flat, high = Parabola(0.5, q=0.0), PowerLaw(np.array([1.0, 1.0]), 1.5, q=np.array([1000.0, -1000.0]))
     locus = flat.locate(np.array([0.0]))
-    np.testing.assert_allclose(normal_offsets(high, locus.x, locus.y, locus.slope_angle), [[1000.0], [-1000.0]])
+    np.testing.assert_allclose(normal_offsets(high, locus), [[1000.0], [-1000.0]])
 
 
 def test_where_contours_end_the_band_is_not_known():
@@ -102,7 +105,7 @@ def test_where_contours_end_the_band_is_not_known():
 def test_a_normal_may_pass_below_a_contour():
     """It leads to the left, and climbs more slowly than the contour."""
     far = Parabola(np.array([1.0]), q=10.0)
-    assert np.isnan(normal_offsets(far, np.array([-1.0]), np.array([0.0]), np.array([1.5]))).all()
+    assert np.isnan(normal_offsets(far, Feet(np.array([-1.0]), np.array([0.0]), np.array([1.5])))).all()
 
 
 def test_the_reference_is_the_most_central_draw():
@@ -112,6 +115,50 @@ def test_the_reference_is_the_most_central_draw():
     r = np.array([0.5, 0.5, 0.5, 0.8])
     band = normal_band(tree("circle", r=r, q=1.0 - r, x_c=0.0 * r), [0.0, 0.6])
     assert band.y[0] == pytest.approx(0.2)  # it alone reaches both places
+
+
+def distances(place, foot, direction, a, q, x_c):
+    """Squares of the distances along normals, of a parabola that is turned, scaled and shifted; by a quadratic."""
+    (shift_x, shift_y, turn, growth), (centre_x, centre_y) = place, (foot[0].mean(), foot[1].mean())
+    cos, sin = np.cos(turn), np.sin(turn)
+    away_x, away_y = foot[0] - centre_x - shift_x, foot[1] - centre_y - shift_y
+    x = (cos * away_x + sin * away_y) / (1.0 + growth) + centre_x - x_c
+    y = (-sin * away_x + cos * away_y) / (1.0 + growth) + centre_y - q
+    along_x, along_y = -np.sin(direction - turn), np.cos(direction - turn)
+    # y + t along_y = a (x + t along_x)²
+    square, linear, rest = a * along_x**2, 2.0 * a * x * along_x - along_y, a * x**2 - y
+    t = 2.0 * rest / (-linear + np.sqrt(linear**2 - 4.0 * square * rest))
+    return ((1.0 + growth) * t) ** 2
+
+
+@pytest.mark.parametrize(("align", "count"), [("translation", 2), ("rigid", 3), ("similarity", 4)])
+def test_contours_are_moved_to_where_another_search_finds_them_nearest(align, count):
+    draws = np.array([[0.505, 0.496, 0.5], [0.303, 0.298, 0.3], [0.002, -0.003, 0.005]])
+    reference = Parabola(0.5, q=0.3)
+    locus = reference.locate(reference.parameter_of_x(np.linspace(-0.1, 0.6, 15)))
+    foot = np.stack([locus.x, locus.y])
+    contours = Parabola(*draws)
+    moves = aligned(contours, locus, align)
+    offsets = normal_offsets(contours, locus, moves)
+    for k, values in enumerate(draws.T):
+
+        def total(free, values=values):
+            return distances(np.r_[free, np.zeros(4 - count)], foot, locus.slope_angle, *values).sum()
+
+        place = np.r_[moves.shift[:, k], moves.turn[k], moves.scale[k] - 1.0]
+        np.testing.assert_allclose(offsets[k] ** 2, distances(place, foot, locus.slope_angle, *values), atol=1e-13)
+        best = scipy.optimize.minimize(total, np.zeros(count), method="BFGS", options={"gtol": 1e-12})
+        assert np.sum(offsets[k] ** 2) <= 1.01 * best.fun + 1e-13
+
+
+def test_a_shift_alone_leaves_no_band_of_the_shape():
+    rng = np.random.default_rng(2)
+    shifts = rng.normal(0.0, 0.01, (2, 60))
+    posterior = tree("ellipse", a=np.full(60, 0.7), b=np.full(60, 0.5), q=0.3 + shifts[0], x_c=shifts[1])
+    for band_of in (normal_band, contour_band):
+        wide, narrow = (band_of(posterior, X, align=align) for align in (None, "translation"))
+        assert float((wide.upper - wide.lower).min()) > 0.02
+        np.testing.assert_allclose(narrow.upper - narrow.lower, 0.0, atol=1e-9)
 
 
 def test_units_and_attributes():
@@ -127,6 +174,9 @@ def test_wrong_arguments_are_refused():
         normal_band(posterior, X, 1.0)
     with refused(ParameterError, "x"):
         normal_band(posterior, [np.nan])
+    for band_of in (normal_band, contour_band):
+        with refused(ParameterError, align="turn"):
+            band_of(posterior, X, align="turn")
     for reference in (Parabola([0.5, 0.6], q=0.3), "truth"):
         with refused(ParameterError, "one contour"):
             normal_band(posterior, X, reference=reference)

@@ -6,10 +6,12 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.assessment.assumptions import Alternative, alternatives_of, stated_cell
+from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.deadline import Deadline
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.result import best_draw
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optimum_beside
 from tactile_bayes.inference.stored_experiment import experiment_of
@@ -40,7 +42,9 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     xr.Dataset
         Over "cause", the likeliest first: log_evidence above that of the model as it is, by Laplace's approximation for
         the noise as it is estimated from the record; describes, 1 if the rest is no more than that noise; and remedy,
-        the entries of rig.toml, or the family. A cause that could not be tried is left out.
+        the entries of rig.toml, or the family. A cause that could not be tried is left out. If single samples fit no
+        contact until a column is read otherwise (another sign, say), nothing is tried, and the attribute misread is
+        what `inspect_record` says of it.
 
     Raises
     ------
@@ -67,6 +71,9 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     experiment, seed = experiment_of(posterior), seed_sequence(rng)
     stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
     start = {**stated, **{str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}}
+    misread = _misread(experiment)
+    if misread:
+        return xr.Dataset({name: ("cause", []) for name in ("log_evidence", "describes")}, attrs={"misread": misread})
     deadline = Deadline.after(_SECONDS)
     own = _optimum(experiment, start, seed, deadline)
     found = []
@@ -86,6 +93,15 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
         coords={"cause": [each.name.replace(" inferred", "") for each, _ in found]},
         attrs={"described": int(own.fits)},
     )
+
+
+def _misread(experiment: Experiment) -> str:
+    """Return how columns of the record are to be read instead, if no contact fits them as they are; else empty."""
+    for finding in inspect_record(experiment.record, experiment.rig).messages:
+        correction = str(finding.details.get("advice", ""))
+        if finding.kind in ("no fit", "below the pivot") and correction != CHECK_RIG and "friction" not in correction:
+            return str(finding)
+    return ""
 
 
 def _optimum(

@@ -110,7 +110,10 @@ TEXTS: Mapping[str, str] = {
     ),
     "not checked": "{but}The record was NOT CHECKED against the predictions of the posterior: {reason}.",
     "reservation": "{summary}",
-    "set by the prior": "The record adds little to the prior of {names}.",
+    "set by the prior": "Of {names} the record says little more than the prior.",
+    "width of the band": (
+        "The {share:.4g} % band is ± {width}{known}; that of the shape alone, wherever it lies, ± {shape}."
+    ),
     # Of a record or a result without any.
     "nothing wrong": "Nothing looks wrong.",
     "all is well": "All is well: the {drawn}, and the record agrees with their predictions (p = {p_value}).",

@@ -17,6 +17,8 @@ def likely_causes(posterior: xr.DataTree) -> str:
     if "causes" not in posterior.children:
         return ""
     causes = posterior["causes"].to_dataset()
+    if "misread" in causes.attrs:
+        return str(causes.attrs["misread"])
     gains = causes.log_evidence.values
     order = np.lexsort((-gains, 1 - causes.describes.values))
     order = order[gains[order] > _GAIN]

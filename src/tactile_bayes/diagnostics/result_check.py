@@ -14,7 +14,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_optional, check_probability, refused
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.findings import Finding, contradiction, of_sweeps
+from tactile_bayes.diagnostics.findings import Finding, contradiction, of_sweeps, quantity
 from tactile_bayes.diagnostics.likely_causes import likely_causes
 from tactile_bayes.diagnostics.predictive_check import Residuals, predictive_check, residuals_of
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
@@ -31,6 +31,7 @@ from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.stated import memory_in, sensor_values
 from tactile_bayes.tasks.documents import read_json
+from tactile_bayes.uncertainty.budget import uncertainty_budget
 
 _HOLDS, _NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
 _NOISES = ("noise_scale", "moment_noise", "force_noise", *GROUPS["discrepancy"])
@@ -42,8 +43,13 @@ _FEWEST_PRIOR_DRAWS = 500
 # % quantile of the prior's draws to the last: some four standard deviations of a normal prior; a prior that is largest
 # at its end has nothing beyond it.
 _BEYOND = 0.5
+# Pull of a normal prior on a zero, in standard deviations of the posterior, below which it is no matter.
+_PULL = 0.5
+_ZEROS = GROUPS["bias"]
 # Width of the posterior over that of the prior above which the record is reported as uninformative.
 _PRIOR_DOMINATED = 0.7
+_SMALL = 0.05  # probability of a record below which a reader may take agreement for disagreement
+_NARROWER = 0.9  # share of the band's half width below which it is said to be narrower
 # Columns whose zero a parameter is.
 _COLUMN_OF_ZERO = {
     "moment_bias": "holding_moment",
@@ -136,7 +142,8 @@ def check(
         noise twice as large as stated, or half; loads of a sample that contradict one another; unknowns of the rig that
         are nearly impossible under their prior; smooth residuals, which a discrepancy can describe; parameters that are
         cut off where the model has no path of the rod; a check that was not made, with the reason. The last, which are
-        no faults, say that the prior sets the gap, and name parameters that the record hardly determines.
+        no faults, say that the prior sets the gap, name parameters of the contour (of a rig: all) that the record
+        hardly determines, and, where all is well, tell what sets the width of the band (`uncertainty_budget`).
 
     Raises
     ------
@@ -216,11 +223,42 @@ def check(
         against.append(Finding("not checked", but=but, reason=not_checked))
     is_well = predictive is not None and not against
     if predictive is not None and is_well:
-        against.append(Finding("all is well", drawn=drawn, p_value=f"{float(predictive.overall_p_value):.2g}"))
+        against.append(Finding("all is well", drawn=drawn, p_value=_p_value(predictive)))
     if trust is not None and trust.attrs["conclusion"] not in (_NOT, _HOLDS):
         against.append(Finding("reservation", summary=trust.attrs["summary"]))
     against += [*_prior_dominated(posterior, known=beyond), *_going_back(posterior, record)]
+    if is_well:
+        against += _width_of_band(posterior)
     return Check(tuple(against), is_well, predictive)
+
+
+def _p_value(predictive: xr.Dataset) -> str:
+    """Return the probability of a record that agrees; a small one with that of a record which does not."""
+    p_value, alarm = float(predictive.overall_p_value), float(predictive.attrs["false_alarm"])
+    return f"{p_value:.2g}" + f", still above the {alarm:.2g} of disagreement" * (p_value < _SMALL)
+
+
+def _width_of_band(posterior: xr.DataTree) -> list[Finding]:
+    """Report what sets the width of the contour's band."""
+    if posterior.attrs.get("family", GAUGE) == GAUGE or "events" not in posterior.children:
+        return []
+    probability = float(posterior.attrs.get("probability", 0.95))
+    try:
+        budget = uncertainty_budget(posterior, probability)
+    except InferenceError:  # the rod touches none of its contours
+        return []
+    unit = str(budget.half_width.attrs["units"])
+    width, alone, shape = (
+        float(budget[name]) for name in ("half_width", "half_width_if_all_known", "half_width_of_shape")
+    )
+    known = ""
+    if alone < _NARROWER * width:
+        least = int(np.argmin(budget.half_width_if_known.values))
+        name, narrowed = str(budget.unknown[least].values), float(budget.half_width_if_known[least])
+        one = f"with {name} known it would be ± {quantity(narrowed, unit)}, " * (narrowed < _NARROWER * width)
+        known = f"; {one}with all of the rig, as by a gauge, ± {quantity(alone, unit)}"
+    said = {"width": quantity(width, unit), "shape": quantity(shape, unit), "known": known}
+    return [Finding("width of the band", share=100.0 * probability, **said)]
 
 
 def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[Finding]:
@@ -382,7 +420,11 @@ def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
 
 
 def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
-    """Return parameters whose posterior lies where the prior has almost no mass, each with its values as text."""
+    """Return parameters whose posterior lies where the prior has almost no mass, each with its values as text.
+
+    A zero that was not tared is ordinary: it is left out where the record determines it, so that the prior moves it
+    little.
+    """
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
     said = {}
     for name in draws.data_vars:
@@ -391,9 +433,17 @@ def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
             continue
         median = float(draws[name].median())
         least, low, high, most = np.quantile(believed, [0.0, 0.05, 0.95, 1.0])
+        if name in _ZEROS and _pull(draws[name].values, believed) < _PULL:
+            continue
         if not least - _BEYOND * (low - least) <= median <= most + _BEYOND * (most - high):
             said[str(name)] = f"{name} = {median:.3g} (prior: {least:.3g} to {most:.3g})"
     return said
+
+
+def _pull(values: Floats, believed: Floats) -> float:
+    """Return how far a normal prior moves a parameter, in standard deviations of its posterior."""
+    away = abs(float(np.median(values)) - float(np.median(believed)))
+    return 2.0 * away * _width(values) / max(_width(believed), np.finfo(float).tiny) ** 2
 
 
 def _beyond_findings(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr.DataTree) -> list[Finding]:
@@ -431,8 +481,8 @@ def _smooth(predictive: xr.Dataset) -> list[Finding]:
 def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[Finding]:
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
     family = posterior.attrs.get("family", GAUGE)
-    mute = {*_NOISES, *(() if family == GAUGE else family_named(family).roughness)}
-    names = [str(name) for name in draws.data_vars if name not in mute and name not in known]
+    asked = draws.data_vars if family == GAUGE else family_named(family).parameters
+    names = [str(name) for name in draws.data_vars if name in asked and name not in known and name not in _NOISES]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
     return [Finding("set by the prior", names=", ".join(names))] * bool(names)
 

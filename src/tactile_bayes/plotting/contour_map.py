@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours.base import Contour
 
+_SHAPE: dict[str, Any] = {"color": "#5FA5D2", "linewidth": 0.0}  # the band of the shape alone
 _MARGIN = 0.12  # margin beside the gap, as a share of its width
 _ROOM = 0.12  # margin above and below the curves, as a share of their height
 _ENDS: dict[str, Any] = {
@@ -131,6 +132,7 @@ def band_detail(
     *,
     truth: Contour | None = None,
     gap: tuple[float, float] | xr.Dataset | None = None,
+    shape: xr.Dataset | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a band measured from its median, enlarged to fill the Axes; on a map a narrow band is invisible.
@@ -143,6 +145,8 @@ def band_detail(
         The true contour.
     gap : (float, float) or xr.Dataset, optional
         As in `contour`.
+    shape : xr.Dataset, optional
+        A further band, of the shape alone (`contour_band(..., align="translation")`), drawn from its own median.
     ax : Axes, optional
 
     Returns
@@ -164,6 +168,11 @@ def band_detail(
     if ends is not None:
         _draw_gap(ax, *ends)
     ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5)
+    if shape is not None:
+        check_dataset(shape, {"x", "lower", "median", "upper"}, *_BAND)
+        edges = [shape[edge].values - shape["median"].values for edge in ("lower", "upper")]
+        ax.fill_between(shape["x"].values, *edges, zorder=1.6, label="of the shape alone", **_SHAPE)
+        legend_above(ax, 1, legend_entries(ax))
     ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0)
     if truth is not None:
         ax.plot(x, np.asarray(truth.height(x)) - median, **TRUTH)

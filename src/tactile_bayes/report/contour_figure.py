@@ -38,6 +38,7 @@ class ContourFindings:
     edges: xr.Dataset | None  # the gap; None if there are sweeps in one direction only
     probability: float  # of bands and intervals
     overlay: Overlay | None  # another contour, laid over it
+    shape: xr.Dataset | None  # the band of the shape alone
 
 
 class ContourFigure(NamedTuple):
@@ -95,6 +96,10 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
     if ends:
         detail.stretch(*ends, "gap")
     detail.area(x, off[0], off[1], "band")
+    if findings.shape is not None:
+        middle = findings.shape["median"].values
+        detail.area(x, findings.shape["lower"].values - middle, findings.shape["upper"].values - middle, "shape")
+        entries.append(("key-shape", "that of the shape alone, up to a shift"))
     detail.path(x, np.zeros_like(x), "median")
     if findings.overlay is not None and other is not None:
         put_overlay_band(detail, findings.overlay, x, median)

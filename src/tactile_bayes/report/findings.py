@@ -21,6 +21,7 @@ from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.report.contour_figure import ContourFindings
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.budget import uncertainty_budget
 from tactile_bayes.uncertainty.overlay import read_overlay
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
@@ -40,6 +41,7 @@ class Findings(ContourFindings):
 
     interval: xr.Dataset  # posterior predictive, of the readings
     numbers: xr.Dataset  # parameters, from `uncertainty.summary`
+    budget: xr.Dataset  # of the band's width
     checked: Check
     zero: xr.Dataset  # unloaded stretches, from `zero_load`
     comparison: xr.Dataset | None  # of families
@@ -82,14 +84,17 @@ def findings_of(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # as the check does
         zero = zero_load(record)
+    x = reach(posterior)
     found = Findings(
         posterior=posterior,
         record=record,
         contacts=contacts,
-        band=contour_band(posterior, reach(posterior), probability),
+        band=contour_band(posterior, x, probability),
+        shape=contour_band(posterior, x, probability, align="translation"),
         interval=predictive_interval(posterior, probability),
         edges=edges,
         numbers=summary(posterior, probability, edges),
+        budget=uncertainty_budget(posterior, probability),
         checked=checked,
         zero=zero,
         comparison=comparison,

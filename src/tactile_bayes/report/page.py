@@ -27,6 +27,8 @@ from tactile_bayes.report.trust import (
 )
 from tactile_bayes.report.wording import PageTable, chance, fixed, percent, sentence, shown_as, spread
 
+_WIDTH = "width of the band"
+
 
 def page_of(findings: Findings, name: str) -> dict[str, Any]:
     """Return the values of the template's variables; `name` is that of the run."""
@@ -46,6 +48,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "formula": FORMULAS.get(attrs["family"], "flanks of two shapes, " + str(attrs["family"])),
         "share": percent(findings.probability),
         "answer": _answer(findings),
+        "budget": _budget(findings),
         "dimensionless": attrs["units"] == "dimensionless",
         "contour": contour,
         "band_table": PageTable(
@@ -57,7 +60,8 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "shapes": _shapes(findings.comparison),
         "parameters": _parameters(findings, mute=True),
         "is_well": _is_well(findings),
-        "verdicts": findings.checked.messages,
+        "verdicts": [said for said in findings.checked.messages if said.kind != _WIDTH],
+        "width": [said for said in findings.checked.messages if said.kind == _WIDTH],
         "trust": [] if findings.trust is None else str(findings.trust.attrs["words"]).splitlines(),
         "trust_summary": "" if findings.trust is None else str(findings.trust.attrs["summary"]),
         "trust_tables": trust_tables(findings),
@@ -81,6 +85,23 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "hindrances": hindrances(findings.posterior, findings.record),
         "data": {"band": contour.band, "frames": readings.data},
     }
+
+
+def _budget(findings: Findings) -> PageTable:
+    """Return how much of the band's width each unknown accounts for, the largest share first."""
+    budget = findings.budget
+    widths = [budget[name] for name in ("half_width", "half_width_if_all_known", "half_width_of_shape")]
+    unit = shown_as("contact_x", budget.half_width.attrs, [float(widths[0])])
+    rows = [["as it is", "", unit.text(float(widths[0]), 3)]]
+    order = np.argsort(-budget["share"].values, kind="stable")
+    for name, share, known in zip(
+        *(budget[column].values[order] for column in ("unknown", "share", "half_width_if_known")), strict=True
+    ):
+        rows.append([f"{name} known", percent(round(share, 2)), unit.text(known, 3)])
+    rows.append(["all of them known", "", unit.text(float(widths[1]), 3)])
+    rows.append(["of the shape alone, up to a shift", "", unit.text(float(widths[2]), 3)])
+    heads = ["the band", "share of the variance", f"half width{unit.bracketed}"]
+    return PageTable("What sets the width of the band: its median half width along normals", heads, rows)
 
 
 def _is_well(findings: Findings) -> bool:

@@ -141,6 +141,8 @@ def causes_table(findings: Findings) -> PageTable | None:
     if "causes" not in findings.posterior.children:
         return None
     causes = findings.posterior["causes"].to_dataset()
+    if "misread" in causes.attrs:
+        return None
     rows = [
         [str(name), fixed(float(gain), ".0f"), "yes" if describes else "no", str(remedy)]
         for name, gain, describes, remedy in zip(

@@ -40,7 +40,7 @@ def write_watch_page(
             contacts = contact_points(record, posterior)
         with suppress(TactileBayesError):
             edges = gap_if_any(posterior, probability)
-        contour = contour_figure(ContourFindings(posterior, record, contacts, band, edges, probability, None))
+        contour = contour_figure(ContourFindings(posterior, record, contacts, band, edges, probability, None, None))
     names = [name for name in numbers["quantity"].values if not is_direction(name)]
     rows = [parameter_cells(numbers.sel(quantity=name), family) for name in names]
     heads = ["quantity", "meaning", "unit", "estimate", f"{percent(probability)} from", "to"]

@@ -321,7 +321,8 @@ class _Figures:
         known: dict[str, Any] = {"truth": self.truth, "gap": self.edges}
         base = None if carried_sweeps(self.measured) else self.base
         plotting.contour(self.band.x.values, contacts=self.contacts, band=self.band, base=base, ax=above, **known)
-        plotting.band_detail(self.band, ax=below, **known)
+        shape = contour_band(self.result, self.band.x.values, self.band.attrs["probability"], align="translation")
+        plotting.band_detail(self.band, shape=shape, ax=below, **known)
         above.set_xlabel("")
         set_below(above, below)
         return above

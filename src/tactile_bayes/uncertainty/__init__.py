@@ -1,6 +1,7 @@
 """How far a posterior lets contours, contacts and readings range: bands, regions, moments and the gap."""
 
 from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.budget import uncertainty_budget
 from tactile_bayes.uncertainty.contact_moments import contact_moments
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.gap import gap
@@ -20,4 +21,5 @@ __all__ = [
     "overlay_distance",
     "predictive_interval",
     "read_overlay",
+    "uncertainty_budget",
 ]

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import as_numbers
+from tactile_bayes.checks import as_numbers, refused
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import contours_of
@@ -19,6 +19,7 @@ from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import COLUMNS
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family_weights
+from tactile_bayes.uncertainty.offsets import aligned, feet_of, most_central, normal_offsets
 from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
@@ -28,7 +29,12 @@ _NUMBERS_PER_HEIGHT = 12  # numbers that a shape-free contour reads for one of i
 
 
 def contour_band(
-    posterior: xr.DataTree | xr.Dataset, x: ArrayLike, probability: float = 0.95, simultaneous: bool = False
+    posterior: xr.DataTree | xr.Dataset,
+    x: ArrayLike,
+    probability: float = 0.95,
+    simultaneous: bool = False,
+    *,
+    align: str | None = None,
 ) -> xr.Dataset:
     """Return the band in which the contour lies with a given probability, and the median contour height.
 
@@ -44,6 +50,9 @@ def contour_band(
     simultaneous : bool
         If False, the probability holds at every x by itself. If True, it holds for all x at once: the pointwise band
         is widened about the median, everywhere by the same factor, until it contains that share of contours.
+    align : {"translation", "rigid", "similarity"}, optional
+        Give the band of the shape alone: each contour is first shifted, or also turned, or also scaled, onto the most
+        central one, by least squares of the distances along its normals, at these x or at 50 of them.
 
     Returns
     -------
@@ -56,7 +65,8 @@ def contour_band(
     Raises
     ------
     ParameterError
-        If the probability is not in (0, 1), or x is not a list of finite numbers.
+        If the probability is not in (0, 1), x is not a list of finite numbers, or the alignment is unknown, or asked of
+        an average over families.
     InferenceError
         If families are to be averaged of which none fits the record, or that have no weights.
 
@@ -76,12 +86,15 @@ def contour_band(
     at = grid_points(x)
     average: dict[str, str] = {}
     if isinstance(posterior, xr.Dataset) and "probability" in posterior:
+        if align is not None:
+            raise refused("align", align, "give the posterior of one family, or None for an average over families")
         weights, source = family_weights(posterior)
         by_name = dict(zip(posterior["family"].values.tolist(), weights.tolist(), strict=True))
         average = {"averaged_by": source, "weights": json.dumps(by_name)}
         heights = averaged_heights(posterior, at, _DRAWS)
     else:
-        heights = contour_heights(cast(xr.DataTree, posterior), at)  # which refuses other datasets
+        tree = cast(xr.DataTree, posterior)  # others are refused below
+        heights = contour_heights(tree, at) if align is None else _aligned_heights(tree, at, align)
     share = np.isfinite(heights).mean(axis=0)
     lower, median, upper = quantile_band(heights, probability, simultaneous)
     status = np.select(
@@ -111,6 +124,14 @@ def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Fl
         for block in blocks(len(heights), _NUMBERS_PER_HEIGHT * x.size):
             heights[block] = contours.take(block[:, None]).height(x)
     return heights
+
+
+def _aligned_heights(posterior: xr.DataTree, x: Floats, align: str) -> Floats:
+    """Heights at x of contours moved onto the most central one; shape (contours, x)."""
+    contours = contours_drawn(posterior)
+    feet = feet_of(most_central(contours, x), x)
+    moves = aligned(contours, feet, align)
+    return feet.y + normal_offsets(contours, feet._replace(slope_angle=np.zeros_like(x)), moves)
 
 
 def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
