@@ -81,12 +81,12 @@ def group(*rows):
     ("rows", "named", "unnamed"),
     [
         (
-            [("a", 900.0, 1), ("b", 400.0, 0), ("c", 20.0, 1)],
+            [("a", 900.0, 1), ("c", 20.0, 1), ("b", 400.0, 0)],
             ["cure of a", "Less likely", " c"],
             ["cure of b", "cure of c"],
         ),
         ([("a", 900.0, 1), ("b", 897.0, 1)], ["cure of a", "cure of b", "gauge"], []),
-        ([("b", 900.0, 0), ("a", 400.0, 1)], ["cure of a"], ["cure of b"]),
+        ([("a", 400.0, 1), ("b", 900.0, 0)], ["cure of a"], ["cure of b"]),
         ([("b", 900.0, 0), ("a", 400.0, 0)], ["Nothing", "cure of b"], ["cure of a"]),
         ([("b", 1.0, 1)], [], ["cure of b"]),
     ],

@@ -90,7 +90,7 @@ def test_an_inspection_and_contacts_of_a_carried_rod(carried, tmp_path):
 def test_a_run_draws_every_figure_over_what_moves(request, name, kind):
     measured, run = request.getfixturevalue(name)
     assert drive_axis(tb.read_record(measured)).kind == kind
-    for figure in ("observables", "predictive", "rods", "contour"):
+    for figure in ("predictive", "rods", "contour"):
         assert (run / f"{figure}.png").is_file(), figure
 
 

@@ -40,11 +40,11 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     Returns
     -------
     xr.Dataset
-        Over "cause", the likeliest first: log_evidence above that of the model as it is, by Laplace's approximation for
-        the noise as it is estimated from the record; describes, 1 if the rest is no more than that noise; and remedy,
-        the entries of rig.toml, or the family. A cause that could not be tried is left out. If single samples fit no
-        contact until a column is read otherwise (another sign, say), nothing is tried, and the attribute misread is
-        what `inspect_record` says of it.
+        Over "cause", those that describe the record first, and the likeliest of them: log_evidence above that of the
+        model as it is, by Laplace's approximation for the noise as it is estimated from the record; describes, 1 if the
+        rest is no more than that noise; and remedy, the entries of rig.toml, or the family. A cause that could not be
+        tried is left out. If single samples fit no contact until a column is read otherwise (another sign, say),
+        nothing is tried, and the attribute misread is what `inspect_record` says of it.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
                 found.append((each, _optimum(each.experiment, start, seed, deadline)))
             except TactileBayesError:  # what cannot be tried is no cause
                 continue
-    found.sort(key=lambda one: -one[1].log_evidence)
+    found.sort(key=lambda one: (not one[1].fits, -one[1].log_evidence))
     return xr.Dataset(
         {
             "log_evidence": ("cause", [one.log_evidence - own.log_evidence for _, one in found]),

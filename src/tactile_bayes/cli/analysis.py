@@ -66,6 +66,9 @@ def infer(
         ),
         Writes(CHECKPOINT),
     ] = None,
+    no_figures: Annotated[
+        bool, typer.Option("--no-figures", help="Draw no figures, which takes two seconds; the report has its own.")
+    ] = False,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
@@ -82,7 +85,7 @@ def infer(
     if (paths := records_in(record)) != record[:1]:
         if checkpoint is not None:
             raise typer.BadParameter("--checkpoint is for one record: of several, those that are done are kept")
-        return _of_many(paths, rig, out, family, probability, settings, seed, output)
+        return _of_many(paths, rig, out, family, probability, settings, seed, not no_figures, output)
     measured, of_record = rig.read(paths[0])
     with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent, max_seconds=max_seconds) as progress:
         run = analyse(
@@ -96,7 +99,9 @@ def infer(
             settings=settings,
             record_file=paths[0],
             command=ctx.meta["words"],
+            figures=not no_figures,
             progress=progress,
+            follow=None if progress is None else progress.follow,
         )
     go_on = "with --checkpoint FOLDER the same command can resume an interrupted run"
     if checkpoint is not None:
@@ -112,6 +117,7 @@ def _of_many(
     probability: float,
     settings: SamplerSettings,
     seed: int,
+    figures: bool,
     output: Output,
 ) -> Answer:
     """Infer the contours of several records."""
@@ -129,6 +135,7 @@ def _of_many(
             rng=seed,
             settings=settings,
             probability=probability,
+            figures=figures,
             workers=Workers(progress=note),
         )
     files = {"table": out / "runs.csv", "table, as NetCDF": out / "runs.nc"}
@@ -188,6 +195,7 @@ def demo(
             record_file=path,
             command=ctx.meta["words"],
             progress=progress,
+            follow=None if progress is None else progress.follow,
         )
     return answer_of(ctx, run, {"record": path, "rig": of_rig, **run.files}, TRUTH, "the same command starts again")
 
@@ -198,11 +206,12 @@ def answer_of(
     """Return the answer; messages name what is left out, and with --debug its traceback goes to stderr."""
     if run.left_out:
         _trace_back(run, in_full=ctx.find_root().params["debug"])
-    interrupted = "interrupted" in run.posterior.attrs["message"]
+    parts = (isinstance(error, KeyboardInterrupt) for error in run.left_out.values())
+    interrupted = "interrupted" in run.posterior.attrs["message"] or any(parts)
     return Answer(
         _words(run, files, truth),
         lambda: _numbers(run, files, truth),
-        interrupted=f"interrupted, results are from the draws made by then: {go_on}" if interrupted else "",
+        interrupted=f"interrupted, results are of what was made by then: {go_on}" if interrupted else "",
     )
 
 

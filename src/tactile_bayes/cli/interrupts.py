@@ -38,14 +38,15 @@ def resumable(have: Callable[[], str], *, then: str = "the same command resumes"
 
 @contextmanager
 def acknowledge_interrupt(words: str) -> Iterator[None]:
-    """Print a message on stderr at the first interrupt, since the end of the run takes a while."""
+    """Print a message on stderr at the first interrupt or SIGTERM, since the end of the run takes a while."""
 
     def answer(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for each, usual in _USUAL.items():
+            signal.signal(each, usual)
         os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"\ntactile-bayes: {words}\n".encode())
         raise KeyboardInterrupt
 
-    with _handled(answer, signal.SIGINT):
+    with _handled(answer, signal.SIGINT, signal.SIGTERM):
         yield
 
 

@@ -6,7 +6,7 @@ import math
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -132,35 +132,37 @@ def counted(count: int, noun: str) -> str:
     return f"{count:,} {noun}" + "s" * (count != 1)
 
 
-class Show(Protocol):
-    """Function that updates the progress bar."""
+@dataclass(frozen=True)
+class SamplingBar:
+    """A bar that fills with the effective sample size, and then names what follows."""
 
-    def __call__(self, progress: Progress, what: str = "", /) -> object:
+    move: Callable[..., object]
+    max_seconds: float | None
+
+    def __call__(self, progress: Progress, what: str = "", /) -> None:
         """Show progress; `what` names one of several runs."""
+        words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
+        if progress.ess >= _GOAL and progress.r_hat <= _MAX_R_HAT:
+            words, left = "sampled", ""
+        else:
+            seconds = remaining_seconds(progress, self.max_seconds)
+            left = "" if seconds is None else f"about {_in_words(seconds)} left"
+        done = min(progress.ess, _GOAL) if progress.ess == progress.ess else 0.0
+        self.move(total=_GOAL, completed=done, description=f"{what}, {words}" if what else words, left=left)
+
+    def follow(self, what: str) -> None:
+        """Show what is done now."""
+        self.move(total=None, description=what, left="")
 
 
 @contextmanager
-def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[Show | None]:
+def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[SamplingBar | None]:
     """Show a bar that fills with the effective sample size; no bar if quiet or without a terminal."""
     from rich.progress import BarColumn, TextColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(12))
     with moving_bar(quiet, "looking for a start, then sampling", *columns) as move:
-        if move is None:
-            yield None
-            return
-
-        def show(progress: Progress, what: str = "", /) -> None:
-            words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
-            if progress.ess >= _GOAL and progress.r_hat <= _MAX_R_HAT:
-                words, left = "sampled" if what else "sampled; checks, band and figures follow", ""
-            else:
-                seconds = remaining_seconds(progress, max_seconds)
-                left = "" if seconds is None else f"about {_in_words(seconds)} left"
-            done = min(progress.ess, _GOAL) if progress.ess == progress.ess else 0.0
-            move(total=_GOAL, completed=done, description=f"{what}, {words}" if what else words, left=left)
-
-        yield show
+        yield None if move is None else SamplingBar(move, max_seconds)
 
 
 def remaining_seconds(progress: Progress, max_seconds: float | None = None) -> float | None:

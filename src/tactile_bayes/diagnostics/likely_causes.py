@@ -20,8 +20,7 @@ def likely_causes(posterior: xr.DataTree) -> str:
     if "misread" in causes.attrs:
         return str(causes.attrs["misread"])
     gains = causes.log_evidence.values
-    order = np.lexsort((-gains, 1 - causes.describes.values))
-    order = order[gains[order] > _GAIN]
+    order = np.flatnonzero(gains > _GAIN)
     if not order.size:
         return ""
     names, remedies = causes.cause.values, causes.remedy.values

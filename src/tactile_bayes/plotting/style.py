@@ -84,5 +84,7 @@ def own_style(name: Style = "screen") -> Iterator[None]:
 def save_figure(figure: Figure, path: Path, form: str, **options: Any) -> None:
     """Write a figure to a file of this format: in memory first, so that a full disk raises an error that says so."""
     memory = io.BytesIO()
+    if form == "png":
+        options = {"pil_kwargs": {"compress_level": 1}, **options}  # a tenth larger, in half the time
     figure.savefig(memory, format=form, **options)
     path.write_bytes(memory.getbuffer())

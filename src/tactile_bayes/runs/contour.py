@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -46,6 +46,13 @@ _POSTERIOR = "posterior.nc"
 _MOST_PARAMETERS = 5  # largest number of parameters in a figure, unless a contour has more
 
 
+Follow = Callable[[str], object]
+
+
+def _unseen(what: str) -> None:
+    """Show no progress."""
+
+
 @dataclass(frozen=True)
 class ContourRun:
     """Result of `analyse`."""
@@ -59,7 +66,7 @@ class ContourRun:
     checked: Check | None
     messages: tuple[str, ...]  # of the check; last, what is left out, and why
     files: Mapping[str, Path]  # by content
-    left_out: Mapping[str, Exception]  # by the part that failed after sampling, which is None, or has no file
+    left_out: Mapping[str, BaseException]  # by the part that failed after sampling, which is None, or has no file
 
 
 class RunFolder(Folder):
@@ -67,14 +74,14 @@ class RunFolder(Folder):
 
     def __init__(self, out: str | os.PathLike[str]) -> None:
         super().__init__(out, [name for name in INFERENCE if name != _POSTERIOR])
-        self.left_out: dict[str, Exception] = {}
+        self.left_out: dict[str, BaseException] = {}
 
     @contextmanager
     def attempt(self, what: str, name: str) -> Iterator[None]:
-        """Note an error of the block under this name, and drop its file."""
+        """Note an error or an interrupt of the block under this name, and drop its file."""
         try:
             yield
-        except Exception as error:
+        except (Exception, KeyboardInterrupt) as error:
             self.left_out[what] = error
             (self._new / name).unlink(missing_ok=True)
 
@@ -95,7 +102,9 @@ class RunFolder(Folder):
         return tuple(f"Left out: {what}. {_said(error)}" for what, error in self.left_out.items())
 
 
-def _said(error: Exception) -> str:
+def _said(error: BaseException) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return "It was interrupted."
     if isinstance(error, TactileBayesError):
         return str(error)
     if isinstance(error, OSError) and error.filename:
@@ -113,13 +122,16 @@ def analyse(
     truth: Contour | None = None,
     record_file: str | os.PathLike[str] | None = None,
     command: Sequence[str] = (),
+    figures: bool = True,
+    follow: Follow | None = None,
     **options: Any,
 ) -> ContourRun:
-    """Write contact points, contour posterior, band and figures of a record to a folder.
+    """Write contact points, contour posterior, band and, if asked for, figures of a record to a folder.
 
     The posterior is written as soon as it is sampled, and again with its predictions. A part that fails afterwards is
     left out and named, and all others are made. The posterior removes what belonged to a former one; the other files
-    come together at the end, so that a folder without summary.txt is not complete.
+    come together at the end, so that a folder without summary.txt is not complete. `follow` is called with the name of
+    each part that follows sampling, as it begins.
     """
     check_probability("probability", probability)
     rig = rig_of(rig)
@@ -144,7 +156,7 @@ def analyse(
         if not drawn:
             raise
         folder.left_out["predictions"] = error
-    return _completed(folder, measured, rig, drawn[-1], probability, truth)
+    return _completed(folder, measured, rig, drawn[-1], probability, truth, figures, follow or _unseen)
 
 
 def complete(
@@ -158,7 +170,7 @@ def complete(
     """Write a posterior, and what `analyse` writes beside it, to a folder; arguments and result are as there."""
     folder = RunFolder(out)
     folder.write_posterior(posterior)
-    return _completed(folder, measured, rig_of(rig), posterior, probability, None)
+    return _completed(folder, measured, rig_of(rig), posterior, probability)
 
 
 def _completed(
@@ -167,13 +179,16 @@ def _completed(
     rig: Rig,
     result: xr.DataTree,
     probability: float,
-    truth: Contour | None,
+    truth: Contour | None = None,
+    figures: bool = True,
+    follow: Follow = _unseen,
 ) -> ContourRun:
     """Write what follows from the posterior in a folder, of a long record by the samples that the likelihood took."""
     if "blocks" in result.attrs:
         measured, rig = record_of(result), replace(rig, load_cell=None)
     with folder:
         contacts, band, edges, checked = None, None, None, None
+        follow("contact points, band and checks")
         with folder.attempt("contacts", "contacts.csv"):
             contacts = contact_points(measured, result, rig.load_cell)
             if contacts is not None:
@@ -186,6 +201,7 @@ def _completed(
         with folder.attempt("check", "summary.txt"):
             checked = check(result, contacts)
         if checked is not None and any(finding.kind == "not described" for finding in checked.messages):
+            follow("what may be wrong, a second or two each")
             with folder.attempt("causes", "causes"):
                 result["causes"] = xr.DataTree(causes(result, rng=0))
                 folder.replace_posterior(result)
@@ -201,7 +217,9 @@ def _completed(
 
         write_summary()
         before = len(folder.left_out)
-        _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
+        if figures:
+            follow("figures")
+            _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
         if len(folder.left_out) > before:
             write_summary()
         return ContourRun(
@@ -228,7 +246,7 @@ def file_of(path: str | os.PathLike[str], sha256: str) -> dict[str, Any]:
 
 
 def _draw(figures: _Figures, folder: RunFolder) -> None:
-    for name in ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs"):
+    for name in ("predictive", "rods", "contour", "gap", "trace", "pairs"):
         if name != "gap" or figures.edges is not None:
             with folder.attempt(f"figure {name}", f"{name}.png"):
                 folder.draw(name, f"{name}.png", getattr(figures, name))
@@ -285,16 +303,11 @@ class _Figures:
         direction = "both" if len(self.directions) == 2 else self.directions[0]
         return scan(contour, rig, direction=direction, base=self.base)
 
-    def observables(self) -> Any:
-        axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.65, left=1.1, hspace=0.12)
-        _share_x(axes)
-        plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
-        axes[0, 0].figure.align_ylabels(axes[:, 0])
-        return axes
-
     def predictive(self) -> Any:
         axes = _plain_panels(6, 1, 7.0, 8.4, 0.55, above=0.65, left=1.1, hspace=0.14, height_ratios=3 * (2.0, 1.0))
-        _share_x(axes)
+        for ax in axes[:-1, 0]:
+            ax.sharex(axes[-1, 0])
+            ax.tick_params(labelbottom=False)
         probability = float(self.result.attrs["probability"])
         interval = predictive_interval(self.result, probability)
         label = f"{100 * probability:.6g} % predictive"
@@ -358,13 +371,6 @@ class _Figures:
         others = [self.names[k] for k in np.argsort(rank, kind="stable") if self.names[k] not in self.of_contour]
         chosen = {*self.of_contour, *others[: max(0, _MOST_PARAMETERS - len(self.of_contour))]}
         return [name for name in self.names if name in chosen]
-
-
-def _share_x(axes: Any) -> None:
-    """Give Axes in one column the scale of the last one, which alone has labels."""
-    for ax in axes[:-1, 0]:
-        ax.sharex(axes[-1, 0])
-        ax.tick_params(labelbottom=False)
 
 
 def _plain_panels(

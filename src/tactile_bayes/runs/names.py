@@ -8,7 +8,6 @@ INFERENCE = (
     "contacts.csv",
     "band.csv",
     "summary.csv",
-    "observables.png",
     "predictive.png",
     "rods.png",
     "contour.png",

@@ -52,7 +52,7 @@ def contour_band(
         is widened about the median, everywhere by the same factor, until it contains that share of contours.
     align : {"translation", "rigid", "similarity"}, optional
         Give the band of the shape alone: each contour is first shifted, or also turned, or also scaled, onto the most
-        central one, by least squares of the distances along its normals, at these x or at 50 of them.
+        central one, by least squares of the distances along its normals, at these x or at 25 of them.
 
     Returns
     -------
@@ -119,10 +119,15 @@ def contour_band(
 def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Floats:
     """Heights at x of up to `most` contours, evenly picked from the posterior's draws; shape (contours, x)."""
     contours = contours_drawn(posterior, most)
-    heights = np.empty((contours.shape[0], x.size))
+    return _heights(contours, np.broadcast_to(x, (contours.shape[0], x.size)))
+
+
+def _heights(contours: Contour, x: Floats) -> Floats:
+    """Return the heights of n contours, each at its own x of shape (n, k)."""
+    heights = np.empty(x.shape)
     with np.errstate(over="ignore"):  # far out, where no contour is
-        for block in blocks(len(heights), _NUMBERS_PER_HEIGHT * x.size):
-            heights[block] = contours.take(block[:, None]).height(x)
+        for block in blocks(len(heights), _NUMBERS_PER_HEIGHT * x.shape[1]):
+            heights[block] = contours.take(block[:, None]).height(x[block])
     return heights
 
 
@@ -131,6 +136,8 @@ def _aligned_heights(posterior: xr.DataTree, x: Floats, align: str) -> Floats:
     contours = contours_drawn(posterior)
     feet = feet_of(most_central(contours, x), x)
     moves = aligned(contours, feet, align)
+    if align == "translation":
+        return _heights(contours, x - moves.shift[0][:, None]) + moves.shift[1][:, None]
     return feet.y + normal_offsets(contours, feet._replace(slope_angle=np.zeros_like(x)), moves)
 
 

@@ -22,8 +22,8 @@ _BLOCK = 100_000  # number of normals that are searched at once
 _SLOWEST = float(np.finfo(float).tiny)
 # Distance of a point from a normal, relative to the lengths involved, beyond which the normal misses the contour.
 _MISSED = 1e-9
-_FEET = 50  # number of feet by which contours are moved
-_ROUNDS = 3  # of Gauss–Newton: the error of each is the square of that before
+_FEET = 25  # number of feet by which contours are moved
+_ROUNDS = 2  # of Gauss–Newton: the error of each is the square of that before
 # Share of the largest singular value below which a move leaves the contour as it is, like a turn of a circle.
 _INVARIANT = 1e-3
 
