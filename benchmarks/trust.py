@@ -101,7 +101,7 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
         replicate = make_replicate(experiment, number, throw=True)
         found = trust(replicate.posterior, rng=1, replicates=0, assumptions=False)
         numbers = replicate.outcome.numbers
-        rank = math.nan if numbers["check_passed"] else _rank(name, causes(replicate.posterior, rng=1).cause.values.tolist())
+        named = [] if numbers["check_passed"] else causes(replicate.posterior, rng=1).cause.values.tolist()
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
     wholes = [numbers.get(f"simultaneous_{region}", math.nan) for region in ("in_gap", "beside")]
@@ -114,7 +114,7 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
         "beside": numbers.get("pointwise_beside", math.nan),
         "whole": float(np.nanmin(wholes)),
         "converged": numbers["converged"],
-        "rank": rank,
+        "rank": math.nan if numbers["check_passed"] else _rank(name, named),
     }
 
 
