@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -144,9 +145,13 @@ def contradiction(chance: float, dragging: str = "") -> Finding:
 
 
 def quantity(value: float, unit: str) -> str:
-    """Return a value with its unit as text, to three digits, in SI with a prefix."""
+    """Return a value with its unit as text, to three digits: angles in degrees, in SI with a prefix."""
     if unit == "1":
         return f"{value:.3g}"
+    if unit == "rad":
+        return f"{math.degrees(value):.3g}°"
+    if not unit[0].isalpha():  # like 1/m
+        return f"{value:.3g} {unit}"
     size, prefix = prefix_of(value)
     return f"{value / size:.3g} {prefix}{unit}"
 

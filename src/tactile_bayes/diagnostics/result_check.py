@@ -330,7 +330,7 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> Finding:
     place = score.argmax(("discrepancy", "channel"))
     channel, cause = (str(score[dim].values[int(place[dim])]) for dim in ("channel", "discrepancy"))
     worst = check.sel(channel=channel)
-    unit = "" if str(worst.unit.values) == "1" else f" {worst.unit.values}"
+    residual = float(worst.worst_residual)
     family, predictions = posterior.attrs.get("family", GAUGE), check.attrs["predictions"]
     described, result = ("gauge", "rig") if family == GAUGE else (f"family {family}", "contour")
     # The share of predictions alone: the record itself is no prediction.
@@ -345,7 +345,7 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> Finding:
         cause=_CAUSES[cause],
         sweep=int(worst.worst_sweep),
         stretch=_stretch(posterior, worst),
-        residual=f"{float(worst.worst_residual):+.2g}{unit}",
+        residual="+" * (residual > 0.0) + quantity(residual, str(worst.unit.values)),
         result=result,
         advice=likely_causes(posterior)
         or what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0)),
@@ -356,9 +356,10 @@ def _stretch(posterior: xr.DataTree, worst: xr.Dataset) -> str:
     """Return drive angles, or travels of a base that is carried, from the beginning to the end of a stretch."""
     record = record_of(posterior)
     if int(worst.worst_sweep) not in carried_sweeps(record):
-        return f"{float(worst.worst_from):.3g} to {float(worst.worst_to):.3g} rad"
-    unit = _unit(record, "base_x") or " L"
-    return f"{float(worst.worst_from_travel):.3g} to {float(worst.worst_to_travel):.3g}{unit} of travel"
+        return f"{math.degrees(worst.worst_from):.0f}° to {math.degrees(worst.worst_to):.0f}°"
+    unit = str(record["base_x"].attrs.get("units", "1"))
+    begin, end = (quantity(float(worst[f"worst_{name}_travel"]), unit) for name in ("from", "to"))
+    return f"{begin} to {end}{' L' * (unit == '1')} of travel"
 
 
 def _neighbours_over_stated(record: xr.Dataset, check: xr.Dataset) -> float:
@@ -436,7 +437,9 @@ def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
         if name in _ZEROS and _pull(draws[name].values, believed) < _PULL:
             continue
         if not least - _BEYOND * (low - least) <= median <= most + _BEYOND * (most - high):
-            said[str(name)] = f"{name} = {median:.3g} (prior: {least:.3g} to {most:.3g})"
+            unit = str(draws[name].attrs.get("units", "1"))
+            middle, first, last = (quantity(value, unit) for value in (median, least, most))
+            said[str(name)] = f"{name} = {middle} (prior: {first} to {last})"
     return said
 
 
@@ -464,7 +467,7 @@ def _cut_off(posterior: xr.DataTree) -> list[Finding]:
     """Report parameters that are cut off where the model has no equilibria."""
     draws, quantile = posterior_draws(posterior), {"above": 1.0, "below": 0.0}
     ends = [
-        f"{name} ({end} {float(draws[name].quantile(quantile[end])):.3g})"
+        f"{name} ({end} {quantity(float(draws[name].quantile(quantile[end])), draws[name].attrs.get('units', '1'))})"
         for name, end in cut_off_parameters(posterior).items()
     ]
     return [Finding("cut-off posterior", ends=", ".join(ends))] * bool(ends)
@@ -491,8 +494,3 @@ def _width(values: Floats) -> float:
     """Return the width of the central 68 % interval, two standard deviations of a normal distribution."""
     low, high = np.quantile(values, [0.16, 0.84])
     return float(high - low)
-
-
-def _unit(record: xr.Dataset, name: str) -> str:
-    unit = str(record[name].attrs.get("units", "1"))
-    return "" if unit == "1" else f" {unit}"
