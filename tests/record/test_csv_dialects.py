@@ -50,6 +50,14 @@ def test_commas_in_names_part_no_columns_where_semicolons_do(tmp_path, plain):
         read(tmp_path, ";".join(columns.values()), *ROWS, columns={})
 
 
+def test_a_count_of_rows_without_a_name_is_a_column_of_its_own(tmp_path, plain):
+    """As pandas writes the index of a table."""
+    rows = [f"{k};{row}" for k, row in enumerate(ROWS)]
+    found = read(tmp_path, f";{NAMES}", *rows, columns=STATED)
+    np.testing.assert_array_equal(found["index"], [0, 1])
+    assert record_hash(found.drop_vars("index")) == record_hash(plain)
+
+
 @pytest.mark.parametrize("names", ["Messung 4", "Messung 1,5 mm", "Messung;4"])
 def test_lines_before_the_names_are_refused_whatever_signs_are_in_them(tmp_path, names):
     with refused(RecordError, "line 1", "(Messung"):

@@ -237,7 +237,7 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         ([HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"], ["'0,5'"]),
         ([HEADER.replace(",", " "), ROW.replace(",", " ")], ["'sweep'", "(columns: sweep direction drive_angle"]),
         ([HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"], ["line 2, column 'holding_moment'", "'1.000,5'"]),
-        (["," + HEADER, "0," + ROW], ["line 1", "column 1", "line 2", "'0'"]),
+        (["," + HEADER, "7," + ROW], ["line 1", "column 1", "line 2", "'7'"]),
         (["Rig 4", HEADER, ROW], ["line 1", "(Rig 4)", "in line 2"]),
         (
             ["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")],

@@ -104,8 +104,11 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             continue
         if not line.startswith("#"):
             if line.strip(_DELIMITERS + " \r\n"):
-                delimiter = delimiter or _delimiter_of(line, lines_below(file))
+                below = lines_below(file)
+                delimiter = delimiter or _delimiter_of(line, below)
                 names = list(map(visible, cells_in(line, delimiter)))
+                if not names[0] and "index" not in names and _counted(below, delimiter):
+                    names[0] = "index"  # which pandas writes without a name
                 _refuse_equal(names, number, source)
                 heads = dict.fromkeys(names, number) | heads
                 lines = {name: line for name, (line, _) in stated.items()}
@@ -262,6 +265,12 @@ def _delimiter_of(line: str, below: Sequence[str]) -> str:
         if 1 < len(names) == len(cells_in(first, sign)) and not names[0].endswith(","):
             return sign
     return max(_DELIMITERS, key=lambda sign: len(cells_in(line, sign)))
+
+
+def _counted(lines: Sequence[str], delimiter: str) -> bool:
+    """Return whether the first cells of lines are 0, 1, 2, ..."""
+    first = [cells_in(line, delimiter)[0] for line in lines if line.strip()]
+    return bool(first) and first == list(map(str, range(len(first))))
 
 
 def _refuse_equal(names: list[str], number: int, source: Source) -> None:
