@@ -59,6 +59,7 @@ KNOWN = {
     "lag": 1.3,
     "play": 0.02,
     "suspension_compliance": 0.03 / MOMENT,
+    "contact_compliance": 0.001 / FORCE,
     "rest_curvature": 1.1,
     "rest_shape_1": 0.7,
     "rest_shape_2": -0.4,

@@ -41,6 +41,7 @@ KNOWN = {
     "lag": 1.3,
     "play": 0.02,
     "suspension_compliance": 0.03,
+    "contact_compliance": 0.02,
     "rest_curvature": 0.11,
     "rest_shape_1": 0.7,
     "rest_shape_2": -0.4,

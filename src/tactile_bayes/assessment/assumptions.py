@@ -31,7 +31,8 @@ from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
-_MORE = ("base", "drift", "gain", *MEMORY, "suspension_compliance", "rest_curvature", "taper", "stem", "length")
+_YIELDING = ("suspension_compliance", "contact_compliance")
+_MORE = ("base", "drift", "gain", *MEMORY, *_YIELDING, "rest_curvature", "taper", "stem", "length")
 _UNKNOWNS = (*STANDARD, *_MORE)
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 

@@ -51,6 +51,7 @@ _UNITS = {
     (False, 0, -1): "1/L",
     (False, 1, 0): "EI/L",
     (False, -1, 0): "L/EI",
+    (False, -1, 2): "L³/EI",
     (False, -2, 0): "(L/EI)²",
     (True, 1, 0): "EI/L²",
 }

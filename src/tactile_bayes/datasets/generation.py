@@ -291,6 +291,7 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         ),
         friction_angle=np.arctan(column("unknown.friction")),
         suspension_compliance=column("unknown.suspension_compliance") * units.moment_unit,
+        contact_compliance=column("unknown.contact_compliance") * units.force_unit / length,
         profile=profile_of() if spec.has_taper else None,
         drive_angles=drives.way,
         relative=drives.way.ndim == 1,

@@ -18,8 +18,9 @@ NO_LOAD = (
 )
 GAUGE = "gauge"  # name of the family of a gauge, whose contour is known
 _OF_ROD = ("rest_curvature", "taper", "stem", "length")
+_YIELDING = ("suspension_compliance", "contact_compliance")
 # Unknowns of a rig, or groups of them, that may cause a misfit.
-_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "lag", "play", *_OF_ROD)
+_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", *_YIELDING, "lag", "play", *_OF_ROD)
 _SMOOTH = "shape-free"
 
 

@@ -162,6 +162,7 @@ def trace(
     *,
     friction_angle: ArrayLike = 0.0,
     suspension_compliance: ArrayLike = 0.0,
+    contact_compliance: ArrayLike = 0.0,
     profile: Profile | None = None,
     tolerance: Floats | None = None,
     drive_angles: Floats | None = None,
@@ -176,6 +177,8 @@ def trace(
     sweep_frame, friction_angle, suspension_compliance
         n contours; friction angles δ = arctan μ [rad], and turns of the pivot's suspension per holding moment, c in
         (drive angle) = φ0 + c m0 [rad/(EI/L)], for each or for all.
+    contact_compliance
+        Ways of the object along its normal per normal force [L/(EI/L²)], for each or for all.
     profile : Profile, optional
         Rod whose rest curvature or rigidity varies along it; by default it is uniform and a circular arc at rest.
     tolerance : ndarray, shape (3,), optional
@@ -189,7 +192,7 @@ def trace(
         Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
         after the last. Drive angles are then travels, in rod lengths.
     """
-    sweeps = _sweeps_of(sweep_frame, friction_angle, suspension_compliance)
+    sweeps = _sweeps_of(sweep_frame, friction_angle, suspension_compliance, contact_compliance)
     shapes = shapes_of(sweep_frame.contour, *(sweep_frame.own_domain() if sweep_frame.contour.halves is None else ()))
     angles = np.empty(0) if drive_angles is None else drive_angles
     options: dict[str, Any] = {"profile": profile, "tolerance": tolerance}
@@ -219,12 +222,14 @@ def trace(
     )
 
 
-def _sweeps_of(sweep_frame: SweepFrame, friction_angle: ArrayLike, compliance: ArrayLike) -> Sweeps:
+def _sweeps_of(
+    sweep_frame: SweepFrame, friction_angle: ArrayLike, compliance: ArrayLike, yielding: ArrayLike
+) -> Sweeps:
     """One sweep along each contour, with loads in EI/L and EI/L²."""
     count, every = sweep_frame.size, np.arange(sweep_frame.size)
     values = {name: getattr(sweep_frame, name) for name in ("base_x", "base_y", "length", "standoff", "taper", "stem")}
     values |= {"rest_curvature": sweep_frame.rest_curvature, "friction_angle": friction_angle, "compliance": compliance}
-    values |= {"offset": 0.0, "rigidity": 1.0, "relative_length": 1.0}
+    values |= {"yielding": yielding, "offset": 0.0, "rigidity": 1.0, "relative_length": 1.0}
     each: dict[str, Any] = {name: np.array(np.broadcast_to(of, (count,)), dtype=float) for name, of in values.items()}
     each["rest_shape"] = np.array(np.broadcast_to(sweep_frame.rest_shape, (count, MOST_MODES)), dtype=float)
     return Sweeps(contour=every, segment=every, backward=np.ascontiguousarray(sweep_frame.mirrored), **each)

@@ -67,10 +67,9 @@ def amplification(plan: Plan) -> xr.Dataset:
     surface of possible contacts.
     """
     refined = _refined(plan)
-    if plan.rig.known.get("suspension_compliance"):
-        raise ParameterError(
-            "suspension_compliance is known, and amplification is of a pivot that does not yield: leave it out"
-        )
+    for name, what in (("suspension_compliance", "a pivot"), ("contact_compliance", "an object")):
+        if plan.rig.known.get(name):
+            raise ParameterError(f"{name} is known, and amplification is of {what} that does not yield: leave it out")
     record, rod = refined.scan.record, plan.rig.known_rod
     loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
     chosen = record.isel(sample=loaded)

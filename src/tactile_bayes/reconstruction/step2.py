@@ -181,11 +181,23 @@ def contacts_of(found: Corrected, method: Literal["raw", "constrained"]) -> xr.D
         **({"doubtful_sides": json.dumps(doubtful)} if doubtful else {}),
         **_check(estimate, samples, cell, friction),
     )
+    if found.contact_compliance:
+        contacts = contacts.assign(_before_it_yielded(contacts, samples, found.contact_compliance))
     if found.units != measured.attrs["units"]:
         for variable in contacts.variables.values():
             if variable.attrs.get("units") in _PHYSICAL:
                 variable.attrs["units"] = "1"
     return contacts
+
+
+def _before_it_yielded(contacts: xr.Dataset, samples: Samples, compliance: float) -> dict[str, xr.DataArray]:
+    """Return the places of contacts on an object at rest, which then yields along its normal under the force."""
+    sin, cos = np.sin(contacts.slope_angle), np.cos(contacts.slope_angle)
+    force_x, force_y = samples.side * samples.reading.loads[:, 1], samples.reading.loads[:, 2]
+    way = compliance * samples.rod.force_unit * np.abs(cos * force_y - sin * force_x)
+    ways = {"x": way * sin, "y": -way * cos}
+    names = [(f"{which}contact_{axis}", axis) for which in ("", "other_") for axis in ways]
+    return {name: (contacts[name] + ways[axis]).assign_attrs(contacts[name].attrs) for name, axis in names}
 
 
 def _with_likelier_sides(

@@ -37,6 +37,7 @@ class Corrected(NamedTuple):
     friction: float = 0.0  # Coulomb's coefficient
     # Turn of the pivot per holding moment, relative to the stated rod [rad/(N m), or rad/(EI/L)].
     suspension_compliance: float = 0.0
+    contact_compliance: float = 0.0  # way of the object per normal force, likewise [m/N, or L/(EI/L²)]
     # Units of the record that was measured. Where it is dimensionless and the rod's length was inferred, `record` is in
     # lengths of the stated rod, and SI by name. Empty if they are those of `record`.
     stated_units: str = ""
@@ -72,6 +73,7 @@ def corrected(given: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) 
         replace(cell, lag=0.0, play=0.0),
         rig.get("friction", 0.0),
         rig.get("suspension_compliance", 0.0) * stiffer,
+        rig.get("contact_compliance", 0.0) * stiffer,
         str(given.attrs["units"]),
     )
 

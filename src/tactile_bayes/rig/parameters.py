@@ -143,6 +143,17 @@ _ROWS = (
         0.0,
         of_moment=-1,
     ),
+    Parameter(
+        "contact_compliance",
+        "way of the object along its normal per normal force",
+        "m/N",
+        "half_normal",
+        0.003,
+        0.0,
+        0.0,
+        of_moment=-1,
+        of_length=2,
+    ),
     Parameter("rest_curvature", "mean curvature of the unloaded rod", "1/m", "normal", 0.05, None, of_length=-1),
     *(
         Parameter(f"rest_shape_{k}", f"amplitude of mode {k} {_SHAPE}", "1", "normal", 1.0, hidden=_UNTRACED)
@@ -250,7 +261,7 @@ STANDARD = (
     "taper_error",
 )
 # Parameters that are zero or positive, and may be zero.
-MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem", *MEMORY)
+MAY_VANISH = ("friction", "suspension_compliance", "contact_compliance", "taper", "stem", *MEMORY)
 
 
 def parameter_named(name: str) -> Parameter | None:

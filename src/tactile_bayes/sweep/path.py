@@ -71,16 +71,17 @@ def sweep_paths(
     rod: Rod | None = None,
     friction: float = 0.0,
     compliance: float = 0.0,
+    yielding: float = 0.0,
     drive_angles: Floats | None = None,
 ) -> Paths:
     """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
-    Parameters and errors are those of `scan`, with one pivot and one direction, and the compliance of the suspension
-    [rad/(EI/L)].
+    Parameters and errors are those of `scan`, with one pivot and one direction, and the compliances of the suspension
+    [rad/(EI/L)] and of the object [L/(EI/L²)].
     """
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
-    rubbing = rod, friction_angle_of(friction), compliance
+    rubbing = rod, friction_angle_of(friction), compliance, yielding
     height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
     if np.any(height <= base[1]):
         raise ContourError(
@@ -97,6 +98,7 @@ def rotated_paths(
     rod: Rod,
     friction_angle: float,
     compliance: float,
+    yielding: float,
     drive_angles: Floats | None,
     *,
     polished: bool = True,
@@ -108,6 +110,7 @@ def rotated_paths(
         sweep_frame,
         friction_angle=friction_angle,
         suspension_compliance=compliance,
+        contact_compliance=yielding,
         profile=rod.profile,
         drive_angles=drive_angles,
         polished=polished,
@@ -122,6 +125,7 @@ def carried_paths(
     rod: Rod | None = None,
     friction: float = 0.0,
     compliance: float = 0.0,
+    yielding: float = 0.0,
 ) -> tuple[Paths, Direction]:
     """Compute the exact path of a rod that a drive carries along one contour, and the direction that its side implies.
 
@@ -139,6 +143,7 @@ def carried_paths(
             sweep_frame,
             friction_angle=friction_angle,
             suspension_compliance=compliance,
+            contact_compliance=yielding,
             profile=rod.profile,
             drive_angles=np.interp(travels, drive.travels, path.travels),
             lines=path.lines[None],

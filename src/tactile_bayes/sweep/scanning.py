@@ -145,7 +145,9 @@ def equilibria(
     pivots = check_pivots("base", base)
     if len(pivots) > 1:
         raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
-    rod, friction, compliance = acting(rig)
+    rod, friction, compliance, yielding = acting(rig)
+    if yielding:
+        raise ParameterError("contact_compliance is known, but equilibria are of an object that does not yield")
     sweep_frame = to_sweep_frame(contour, pivots[0], direction, rod)
     index = np.zeros(alpha.size, dtype=np.intp)
     side = -1.0 if sweep_frame.mirrored[0] else 1.0
@@ -283,14 +285,15 @@ def scan(
     return Scan(make_record(record, Rig(rod=acts[0])), tuple(sweeps), contour)
 
 
-def acting(rig: Rig | None) -> tuple[Rod, float, float]:
-    """Return the rod, the friction and the compliance [rad/(EI/L)] that known deviations give a rig."""
+def acting(rig: Rig | None) -> tuple[Rod, float, float, float]:
+    """Return rod, friction and compliances, of the suspension [rad/(EI/L)] and of the object [L/(EI/L²)], of a rig."""
     rig = rig_of(rig)
     rod, known = rig.known_rod, rig.known
     for name, correction in _NOT_SWEPT.items():
         if known.get(name, 0.0):
             raise ParameterError(f"{name} is known to be {known[name]:g}: {correction}")
-    return rod, rig.friction, known.get("suspension_compliance", 0.0) * rod.moment_unit
+    yielding = known.get("contact_compliance", 0.0) * rod.force_unit / rod.length
+    return rod, rig.friction, known.get("suspension_compliance", 0.0) * rod.moment_unit, yielding
 
 
 def _shifted(drives: list[Drive], rig: Rig) -> list[Drive]:
@@ -317,10 +320,10 @@ def _given(base: Any, options: Mapping[str, Any]) -> str | None:
 
 
 def _paths_of(
-    contour: Contour, drive: Drive, rod: Rod, friction: float, compliance: float
+    contour: Contour, drive: Drive, rod: Rod, friction: float, compliance: float, yielding: float
 ) -> Iterator[tuple[Paths, Direction, Floats]]:
     """Follow the path of each sweep of a drive, with states at its drive angles or travels, which are increasing."""
-    known: dict[str, Any] = {"rod": rod, "friction": friction, "compliance": compliance}
+    known: dict[str, Any] = {"rod": rod, "friction": friction, "compliance": compliance, "yielding": yielding}
     if isinstance(drive, Carried):
         travels = drive.travels
         if drive.drive_step is not None or not isinstance(drive, Motion) or drive.x.size <= _FEWEST_POSES:

@@ -78,7 +78,7 @@ def scan_many(
             f"contours with parameters of shape (n,) are wanted, not of shape {contours.shape}: for one contour, use "
             "scan"
         )
-    (rod, friction, compliance), (count,) = acting(rig), contours.shape
+    (rod, friction, compliance, yielding), (count,) = acting(rig), contours.shape
     try:
         x, y = (np.broadcast_to(check_numbers("base", b), (count,)) for b in base)
         angles = check_array("drive_angles", drive_angles)
@@ -97,7 +97,8 @@ def scan_many(
             "degrees are converted by np.radians"
         )
     sweep_frame = frame_of(contours, count, (x, y), direction, rod)
-    paths = rotated_paths(sweep_frame, rod, friction_angle_of(friction), compliance, angles, polished=False)
+    of_rig = rod, friction_angle_of(friction), compliance, yielding
+    paths = rotated_paths(sweep_frame, *of_rig, angles, polished=False)
     units = ManyUnits.of_rod(rod)
     system = "dimensionless" if rod.is_dimensionless else "SI"
 

@@ -138,9 +138,12 @@ def infer_contacts(
             "the record carries no data sheet of its load cell: give a Rig(load_cell=LoadCell(force_noise=..., "
             "moment_noise=...)), or LoadCell.from_zero_load(record), which finds the noise in the unloaded samples"
         )
-    measured, cell, friction, compliance, _ = corrected(measured, stated, rig.known)
-    if compliance:
-        raise ParameterError("infer_contacts knows no compliant suspension: say that suspension_compliance is 0")
+    measured, cell, friction, *compliances, _ = corrected(measured, stated, rig.known)
+    if any(compliances):
+        raise ParameterError(
+            "infer_contacts knows no compliant suspension, and no object that yields: say that suspension_compliance "
+            "and contact_compliance are 0"
+        )
     measured, cell = thinned(measured, cell)
     density, rows, log_prior = density_of(measured, cell, friction, prior)
     if not rows.size:

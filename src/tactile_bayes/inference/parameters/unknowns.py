@@ -34,7 +34,8 @@ _SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps i
 # Parameters of the noise, which are none of the forward model.
 _OF_NOISE = (*GROUPS["discrepancy"], "noise_scale", "moment_noise", "force_noise")
 # Parameters that change the path or the reading of the drive angle, and their names in `RigValues`.
-_RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
+_RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "friction")}
+_RIG |= {name: name for name in ("suspension_compliance", "contact_compliance")}
 _RIG["backlash"] = "drive_angle_backlash"
 # Groups that change only what the load cell senses, not the path.
 _SENSED = ("bias", "drift", "gain", "lever", *SENSOR)

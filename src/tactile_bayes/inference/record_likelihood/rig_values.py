@@ -11,6 +11,7 @@ class RigValues(NamedTuple):
     drive_angle_offset: Any = 0.0  # encoder offset in addition to that of the load cell's data sheet [rad]
     rigidity_scale: Any = 1.0  # flexural rigidity over the stated one
     suspension_compliance: Any = 0.0  # turn of the pivot's suspension per holding moment [rad/(EI/L) as stated]
+    contact_compliance: Any = 0.0  # way of the object per normal force [L/(EI/L²) as stated]
     friction: Any = 0.0  # Coulomb's coefficient
     drive_angle_backlash: Any = 0.0  # forward less backward reading, in addition to the data sheet [rad]
     rest_curvature: Any = 0.0  # rest curvature of the rod in addition to the stated one [1/L]

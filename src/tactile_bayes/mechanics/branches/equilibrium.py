@@ -20,7 +20,7 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.mechanics.branches.line import Line, components, off_line
-from tactile_bayes.mechanics.branches.outline import Place, narrower, place
+from tactile_bayes.mechanics.branches.outline import Place, further, narrower, place
 from tactile_bayes.mechanics.branches.phase import (
     STUCK,
     Move,
@@ -126,15 +126,18 @@ class _Response(NamedTuple):
 def balance(scene: Scene, at: Equilibrium) -> tuple[Balance, _Equations]:
     """Loads and tangent at a point near the branch."""
     contact, size = contact_at(scene, at), max(at.force, 0.0)
-    spot = narrower(scene.outline, place(scene.outline, contact.p), contact.arclength)
     sin_gamma, cos_gamma = math.sin(contact.friction_angle), math.cos(contact.friction_angle)
+    yielding = scene.rig.yielding
+    spot = narrower(scene.outline, place(scene.outline, contact.p), contact.arclength)
+    spot = further(spot, yielding * size * cos_gamma)
     sin, cos = spot.sin * cos_gamma + spot.cos * sin_gamma, spot.cos * cos_gamma - spot.sin * sin_gamma
     force = _Force(size, sin, cos, sin_gamma, cos_gamma)
     by_p, by_q = moves(scene.phase, spot.speed)
     here, pose_by_p, pose_by_q, by_force = _posed(scene, contact, size, by_p)
-    first, second = _motion(scene, spot, by_p, pose_by_p), _motion(scene, spot, by_q, pose_by_q)
+    first, second = _motion(scene, spot, force, by_p, pose_by_p), _motion(scene, spot, force, by_q, pose_by_q)
+    loaded = _Motion(0.0, yielding * cos_gamma, 0.0, 0.0, by_force)
     angle = math.atan2(sin, cos) + contact.psi1 + here.turn
-    equations = _equations(scene.line, scene.rig.compliance, spot, force, here, first, second, by_force, angle)
+    equations = _equations(scene.line, scene.rig.compliance, spot, force, here, first, second, loaded, angle)
     tangent, moment = cross(equations.by_one, equations.by_two), equations.moment
     turned = size * dot(equations.turn_by, tangent)
     rates = Rates(
@@ -161,8 +164,9 @@ def _posed(scene: Scene, contact: Touch, force: float, by_p: Move) -> tuple[Pose
 
 
 @compiled
-def _motion(scene: Scene, spot: Place, by: Move, pose: Pose) -> _Motion:
-    closer, turn = scene.outline.narrowing * by.arclength, spot.bend * by.p + by.friction_angle
+def _motion(scene: Scene, spot: Place, force: _Force, by: Move, pose: Pose) -> _Motion:
+    pressed = -scene.rig.yielding * force.size * force.sin_gamma * by.friction_angle
+    closer, turn = scene.outline.narrowing * by.arclength + pressed, spot.bend * by.p + by.friction_angle
     return _Motion(spot.speed * by.p, closer, turn, by.psi1, pose)
 
 
@@ -175,11 +179,10 @@ def _equations(
     here: Pose,
     by_p: _Motion,
     by_q: _Motion,
-    by_force: Pose,
+    loaded: _Motion,
     angle: float,
 ) -> _Equations:
     """Equations of a base at an angle before the turn of the suspension."""
-    loaded = _Motion(0.0, 0.0, 0.0, 0.0, by_force)
     if line is None:
         along, across = spot.x * force.cos + spot.y * force.sin, spot.y * force.cos - spot.x * force.sin
         p = _about_pivot(compliance, along, across, force, 0.0, by_p)

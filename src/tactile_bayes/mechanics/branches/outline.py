@@ -117,10 +117,15 @@ def place(outline: Outline, p: float) -> Place:
 
 
 @compiled
+def further(at: Place, way: float) -> Place:
+    """Point that has moved into the object, along its normal."""
+    return Place(at.x - way * at.sin, at.y + way * at.cos, at.sin, at.cos, at.speed - way * at.bend, at.bend)
+
+
+@compiled
 def narrower(outline: Outline, at: Place, arclength: float) -> Place:
     """Point beside which the rod lies with an arc length, from that of its base."""
-    d = outline.narrowing * arclength
-    return Place(at.x - d * at.sin, at.y + d * at.cos, at.sin, at.cos, at.speed - d * at.bend, at.bend)
+    return further(at, outline.narrowing * arclength)
 
 
 @compiled

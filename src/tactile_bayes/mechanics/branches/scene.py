@@ -31,6 +31,7 @@ class RigParameters(NamedTuple):
     # lesser parameters. Of one that sticks, that of the last that slid.
     friction_angle: float
     compliance: float  # turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]
+    yielding: float  # way of the object along its normal per normal force [L/(EI/L²)]
     offset: float  # encoder offset in the sweep frame [rad]
     sign: float  # −1 in backward sweeps, else 1
     moment_unit: float
@@ -82,8 +83,8 @@ def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
 @compiled
 def with_friction(scene: Scene, angle: float) -> Scene:
     """Scene with friction of an angle, which acts in either sense."""
-    own, compliance, offset, sign, moment_unit, force_unit = scene.rig
-    rig = RigParameters(angle, compliance, offset, sign, moment_unit, force_unit)
+    own, compliance, yielding, offset, sign, moment_unit, force_unit = scene.rig
+    rig = RigParameters(angle, compliance, yielding, offset, sign, moment_unit, force_unit)
     beam = scene.beam if angle == own else rubbed_otherwise(scene.beam)
     return Scene(scene.outline, beam, rig, scene.line, scene.phase, scene.anchor)
 

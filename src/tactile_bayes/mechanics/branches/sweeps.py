@@ -101,6 +101,7 @@ class Sweeps(NamedTuple):
     backward: Flags
     friction_angle: Floats
     compliance: Floats
+    yielding: Floats
     # Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own.
     rest_curvature: Floats
     rest_shape: Floats  # amplitudes of the modes of a profile, shape (sweeps, MOST_MODES)
@@ -212,7 +213,8 @@ def _scene(
     sign = -1.0 if sweep.backward else 1.0
     offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
     moment = sweep.rigidity / sweep.relative_length
-    rig = RigParameters(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
+    force = moment / sweep.relative_length
+    rig = RigParameters(sweep.friction_angle, sweep.compliance, sweep.yielding, offset, sign, moment, force)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
     return Scene(outline, beam, rig, line, TIP, NOWHERE)
