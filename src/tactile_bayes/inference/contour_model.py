@@ -83,7 +83,8 @@ class ContourModel:
             )
         self.found = self._zero_load()
         self.zero, noise_found = self._unloaded()
-        rough = np.where(noise_found > 0.0, noise_found, self._rough_noise())
+        is_white = (noise_found > 0.0) & (not unknowns.remember)  # else readings that decay count as unloaded
+        rough = np.where(is_white, noise_found, self._rough_noise())
         largest = np.nan_to_num(np.abs(self.likelihood.measured)).max(axis=0)
         self.deviation = np.where(self.present, np.maximum(rough, np.maximum(1e-7 * largest, 1e-12)), 1.0)
         self.likelihood.noise = np.where(self.present, rough, np.inf)
