@@ -171,7 +171,7 @@ def band_detail(
     if shape is not None:
         check_dataset(shape, {"x", "lower", "median", "upper"}, *_BAND)
         edges = [shape[edge].values - shape["median"].values for edge in ("lower", "upper")]
-        ax.fill_between(shape["x"].values, *edges, zorder=1.6, label="of the shape alone", **_SHAPE)
+        ax.fill_between(shape["x"].values, *edges, zorder=1.6, label="band of the shape alone, up to a shift", **_SHAPE)
         legend_above(ax, 1, legend_entries(ax))
     ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0)
     if truth is not None:
