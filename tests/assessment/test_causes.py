@@ -65,6 +65,15 @@ def test_a_column_that_is_read_with_another_sign_is_named_and_nothing_else_is_tr
     assert "force_x had the other sign" in likely_causes(read)
 
 
+@pytest.mark.slow
+def test_readings_that_stand_out_are_named_where_the_model_describes_all_others():
+    record = replace(CELL, degrees_of_freedom=2.0).measure(swept(SHAPE, step=0.03), rng=1)
+    record.attrs = {name: value for name, value in record.attrs.items() if not name.startswith("load_cell_")}
+    posterior = infer_contour(record, rig=Rig(load_cell=CELL), rng=1, settings=BRIEF)
+    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    assert "degrees_of_freedom = 4" in likely_causes(posterior)
+
+
 def group(*rows):
     names, gains, describes = zip(*rows, strict=True)
     return xr.Dataset(

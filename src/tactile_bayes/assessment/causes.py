@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.assessment.assumptions import Alternative, alternatives_of, stated_cell
+from tactile_bayes.diagnostics.findings import Finding
 from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.contour_problem import contour_problem
@@ -43,8 +46,9 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
         Over "cause", those that describe the record first, and the likeliest of them: log_evidence above that of the
         model as it is, by Laplace's approximation for the noise as it is estimated from the record; describes, 1 if the
         rest is no more than that noise; and remedy, the entries of rig.toml, or the family. A cause that could not be
-        tried is left out. If single samples fit no contact until a column is read otherwise (another sign, say),
-        nothing is tried, and the attribute misread is what `inspect_record` says of it.
+        tried is left out. If single samples fit no contact until a column is read otherwise (another sign, say), or
+        the model describes all but some readings that stand out, nothing is tried, and the attribute misread is what
+        `inspect_record` says of it.
 
     Raises
     ------
@@ -71,11 +75,13 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     experiment, seed = experiment_of(posterior), seed_sequence(rng)
     stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
     start = {**stated, **{str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}}
-    misread = _misread(experiment)
-    if misread:
-        return xr.Dataset({name: ("cause", []) for name in ("log_evidence", "describes")}, attrs={"misread": misread})
+    seen = inspect_record(experiment.record, experiment.rig).messages
+    if misread := [finding for finding in seen if _is_misread(finding)]:
+        return _of_readings(misread[:1])
     deadline = Deadline.after(_SECONDS)
     own = _optimum(experiment, start, seed, deadline)
+    if own.fits and (outliers := [finding for finding in seen if finding.kind == "outlier"]):
+        return _of_readings(outliers)  # its optimum bears them, and the posterior does not
     found = []
     for each in alternatives_of(experiment):
         if each.kind != "fixed":
@@ -95,13 +101,16 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     )
 
 
-def _misread(experiment: Experiment) -> str:
-    """Return how columns of the record are to be read instead, if no contact fits them as they are; else empty."""
-    for finding in inspect_record(experiment.record, experiment.rig).messages:
-        correction = str(finding.details.get("advice", ""))
-        if finding.kind in ("no fit", "below the pivot") and correction != CHECK_RIG and "friction" not in correction:
-            return str(finding)
-    return ""
+def _is_misread(finding: Finding) -> bool:
+    """Return whether no contact fits the record as it is, and most do if a column is read otherwise."""
+    correction = str(finding.details.get("advice", ""))
+    return finding.kind in ("no fit", "below the pivot") and correction != CHECK_RIG and "friction" not in correction
+
+
+def _of_readings(findings: list[Finding]) -> xr.Dataset:
+    """Return causes of which none is sought, since readings are wrong."""
+    none: dict[str, Any] = {name: ("cause", []) for name in ("log_evidence", "describes")}
+    return xr.Dataset(none, attrs={"misread": " ".join(findings)})
 
 
 def _optimum(

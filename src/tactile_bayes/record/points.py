@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_path
+from tactile_bayes.checks import check_kind, check_path
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.csv_header import column_described
@@ -61,6 +61,7 @@ def read_points(path: str | os.PathLike[str], *, beside: str = "") -> Points:
     OSError
         If the file cannot be read.
     """
+    check_kind("beside", beside, str, 'give the name of a column, or ""')
     file = check_path("path", path, "give a path, like 'points.csv' or 'part.dxf'")
     if file.suffix.lower() == ".dxf":
         pieces, scale = curves_in(file)

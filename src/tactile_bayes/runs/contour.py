@@ -25,6 +25,7 @@ from tactile_bayes.diagnostics.result_check import Check, check
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
+from tactile_bayes.inference.family import family_of
 from tactile_bayes.inference.result import best_draw, known_of, posterior_draws, record_of, write_result
 from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import Rng
@@ -134,7 +135,7 @@ def analyse(
     each part that follows sampling, as it begins.
     """
     check_probability("probability", probability)
-    rig = rig_of(rig)
+    options["family"], rig = family_of(options.get("family", "parabola")), rig_of(rig)
     measured = with_rod(validate(measured), rig.rod)
     origin = origin_of(measured, probability, command)
     if record_file is not None:

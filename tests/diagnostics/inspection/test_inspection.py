@@ -238,7 +238,7 @@ def test_readings_that_stand_out_in_contact_and_out_of_it(record):
     assert not found.samples.outlier.sel(channel=["holding_moment", "force_y"]).values.any()
     assert found.messages[0].kind == "outlier"
     assert found.messages[0].details["samples"] == "samples 5 and 100"
-    assert "load_cell_degrees_of_freedom: 4" in found.messages[0].details["advice"]
+    assert "degrees_of_freedom = 4 under [load_cell]" in found.messages[0].details["advice"]
     of_outliers = tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3, degrees_of_freedom=5.0)
     (sentence,) = words(put(record, "force_x", [5, 100], [0.05, 0.3]), load_cell=of_outliers)
     assert "that is stated allows for some" in sentence.details["advice"]

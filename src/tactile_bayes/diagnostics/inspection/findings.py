@@ -117,10 +117,8 @@ def _stuck(samples: xr.Dataset) -> list[Finding]:
 
 
 def _outlying(samples: xr.Dataset, cell: LoadCell | None) -> list[Finding]:
-    advice = (
-        "If there are more, state noise with outliers, load_cell_degrees_of_freedom: 4, in the header; else remove the "
-        "row."
-    )
+    entry = rig_entry("degrees_of_freedom", 4, "load_cell")
+    advice = f"If there are more, state noise with outliers ({entry}); else remove the row."
     if cell is not None and np.isfinite(cell.degrees_of_freedom):
         advice = "The noise with outliers that is stated allows for some; else remove the row."
     return [

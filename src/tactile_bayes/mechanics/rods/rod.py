@@ -270,7 +270,7 @@ class Rod:
 
         correction = "give zero or positive numbers, one or one for each point, in the unit of the points"
         diameters = check_numbers("diameter", diameter, correction, least=0.0)
-        if diameters.shape not in ((), np.shape(x)):
+        if diameters.ndim and diameters.shape != np.shape(x):
             raise refused("diameter", diameter, correction)
         if diameters.ndim and taper:
             raise refused("taper", taper, "leave it out: it follows from the diameters at the points")
