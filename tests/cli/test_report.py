@@ -12,7 +12,7 @@ from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
 from tactile_bayes.rig import Rig
 from tactile_bayes.uncertainty import contour_band, overlay_distance, read_overlay
-from tactile_bayes.uncertainty.summary import reach
+from tactile_bayes.uncertainty.rod_reach import reach
 
 call = partial(commands.call, "report")
 

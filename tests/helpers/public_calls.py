@@ -428,7 +428,7 @@ def _summary_calls() -> dict[str, Call]:
     return {
         "contour_band": right(tb.contour_band, **drawn, x=[0.0, 0.1]),
         "uncertainty_budget": right(tb.uncertainty.uncertainty_budget, **drawn),
-        "normal_band": right(tb.uncertainty.normal_band, **drawn, x=[0.0, 0.1]),
+        "normal_band": right(tb.uncertainty.normal_band, **drawn, x=[0.0, 0.1], align="rigid"),
         "predictive_interval": right(tb.uncertainty.predictive_interval, **drawn),
         "gap": right(tb.gap, **drawn, without_events=posterior()),
         "implied_contacts": right(tb.uncertainty.implied_contacts, posterior=posterior(), draws=5),

@@ -16,7 +16,7 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.runs import contour, many
 from tactile_bayes.uncertainty import overlay_distance, read_overlay
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.summary import reach
+from tactile_bayes.uncertainty.rod_reach import reach
 
 STATED = Rig(unknown="nothing")
 

@@ -148,7 +148,7 @@ def test_contours_are_moved_to_where_another_search_finds_them_nearest(align, co
         place = np.r_[moves.shift[:, k], moves.turn[k], moves.scale[k] - 1.0]
         np.testing.assert_allclose(offsets[k] ** 2, distances(place, foot, locus.slope_angle, *values), atol=1e-13)
         best = scipy.optimize.minimize(total, np.zeros(count), method="BFGS", options={"gtol": 1e-12})
-        assert np.sum(offsets[k] ** 2) <= 1.01 * best.fun + 1e-13
+        assert np.sum(offsets[k] ** 2) <= 1.01 * best.fun + 1e-9
 
 
 def test_a_shift_alone_leaves_no_band_of_the_shape():

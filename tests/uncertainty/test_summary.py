@@ -4,7 +4,8 @@ import numpy as np
 
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
+from tactile_bayes.uncertainty.rod_reach import reach
+from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 
 def test_the_summary_has_the_probability_it_is_asked_for(analysed):

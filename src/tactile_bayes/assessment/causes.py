@@ -74,19 +74,20 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     """
     experiment, seed = experiment_of(posterior), seed_sequence(rng)
     stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
-    start = {**stated, **{str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}}
+    drawn = {str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}
+    starts = [{**stated, **drawn}, drawn]  # what is added as stated, and at its prior's median
     seen = inspect_record(experiment.record, experiment.rig).messages
     if misread := [finding for finding in seen if _is_misread(finding)]:
         return _of_readings(misread[:1])
     deadline = Deadline.after(_SECONDS)
-    own = _optimum(experiment, start, seed, deadline)
+    own = _optimum(experiment, starts, seed, deadline)
     if own.fits and (outliers := [finding for finding in seen if finding.kind == "outlier"]):
         return _of_readings(outliers)  # its optimum bears them, and the posterior does not
     found = []
     for each in alternatives_of(experiment):
         if each.kind != "fixed":
             try:
-                found.append((each, _optimum(each.experiment, start, seed, deadline)))
+                found.append((each, _optimum(each.experiment, starts, seed, deadline)))
             except TactileBayesError:  # what cannot be tried is no cause
                 continue
     found.sort(key=lambda one: (not one[1].fits, -one[1].log_evidence))
@@ -109,14 +110,14 @@ def _is_misread(finding: Finding) -> bool:
 
 def _of_readings(findings: list[Finding]) -> xr.Dataset:
     """Return causes of which none is sought, since readings are wrong."""
-    none: dict[str, Any] = {name: ("cause", []) for name in ("log_evidence", "describes")}
+    none: dict[str, Any] = {name: ("cause", []) for name in ("log_evidence", "describes", "remedy")}
     return xr.Dataset(none, attrs={"misread": " ".join(findings)})
 
 
 def _optimum(
-    experiment: Experiment, start: dict[str, float], seed: np.random.SeedSequence, deadline: Deadline
+    experiment: Experiment, starts: list[dict[str, float]], seed: np.random.SeedSequence, deadline: Deadline
 ) -> ContourOptimum:
-    return optimum_beside(contour_problem(experiment).model, start, np.random.default_rng(seed), deadline)
+    return optimum_beside(contour_problem(experiment).model, starts, np.random.default_rng(seed), deadline)
 
 
 def _remedy(alternative: Alternative, experiment: Experiment) -> str:

@@ -32,7 +32,8 @@ from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.tasks import TaskProgress, Workers, workers_of
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.summary import gap_if_any, reach
+from tactile_bayes.uncertainty.rod_reach import reach
+from tactile_bayes.uncertainty.summary import gap_if_any
 
 _USUAL = 0.95  # probability of the band if a posterior does not state one
 # Number of grid points of each region, the gap and both sides of it, at which the effect of the prior is computed.

@@ -40,7 +40,7 @@ Records = Annotated[
 
 # Quantities in the table of several records; the file has all.
 _SHOWN = ("a", "b", "r", "n", "w", "q", "x_c", "gap width")
-_STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again discards them)"
+_STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again leaves a part out)"
 
 
 def infer(
@@ -67,7 +67,8 @@ def infer(
         Writes(CHECKPOINT),
     ] = None,
     no_figures: Annotated[
-        bool, typer.Option("--no-figures", help="Draw no figures, which takes two seconds; the report has its own.")
+        bool,
+        typer.Option("--no-figures", help="Draw no figures, which would take two seconds; the report has its own."),
     ] = False,
     seed: Seed = 1,
     output: Output,
@@ -206,12 +207,10 @@ def answer_of(
     """Return the answer; messages name what is left out, and with --debug its traceback goes to stderr."""
     if run.left_out:
         _trace_back(run, in_full=ctx.find_root().params["debug"])
-    parts = (isinstance(error, KeyboardInterrupt) for error in run.left_out.values())
-    interrupted = "interrupted" in run.posterior.attrs["message"] or any(parts)
     return Answer(
         _words(run, files, truth),
         lambda: _numbers(run, files, truth),
-        interrupted=f"interrupted, results are of what was made by then: {go_on}" if interrupted else "",
+        interrupted=f"interrupted, results are of what was made by then: {go_on}" if run.is_interrupted else "",
     )
 
 

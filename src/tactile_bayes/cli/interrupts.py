@@ -41,12 +41,12 @@ def acknowledge_interrupt(words: str) -> Iterator[None]:
     """Print a message on stderr at the first interrupt or SIGTERM, since the end of the run takes a while."""
 
     def answer(number: int, frame: FrameType | None) -> None:
-        for each, usual in _USUAL.items():
-            signal.signal(each, usual)
+        for each in ours:
+            signal.signal(each, _USUAL[each])
         os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"\ntactile-bayes: {words}\n".encode())
         raise KeyboardInterrupt
 
-    with _handled(answer, signal.SIGINT, signal.SIGTERM):
+    with _handled(answer, signal.SIGINT, signal.SIGTERM) as ours:
         yield
 
 
@@ -76,14 +76,16 @@ def _interrupts_kept() -> Iterator[Callable[[], object]]:
 
 
 @contextmanager
-def _handled(handler: Callable[[int, FrameType | None], None], *signals: signal.Signals) -> Iterator[None]:
-    """Handle signals in the main thread, except those with another handler."""
+def _handled(
+    handler: Callable[[int, FrameType | None], None], *signals: signal.Signals
+) -> Iterator[list[signal.Signals]]:
+    """Handle signals in the main thread, except those with another handler; yield those that are handled."""
     is_main = threading.current_thread() is threading.main_thread()
     ours = [number for number in signals if is_main and signal.getsignal(number) is _USUAL[number]]
     for number in ours:
         signal.signal(number, handler)
     try:
-        yield
+        yield ours
     finally:
         for number in ours:
             signal.signal(number, _USUAL[number])

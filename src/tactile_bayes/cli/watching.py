@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from tactile_bayes.rig import GrowingRecord, Growth
     from tactile_bayes.runs.watch import Watch, WatchUpdate
 
-_STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl-C again leaves that out)"
+_STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl-C again leaves out a part of that)"
+_STOPPED = "stopped by Ctrl-C or a signal"
 
 _PAGE = "watch.html"
 
@@ -114,7 +115,7 @@ def watch(
             with acknowledge_interrupt(_STOPPING):
                 reason = follower.follow()
         except KeyboardInterrupt:
-            reason = "stopped by Ctrl-C"
+            reason = _STOPPED
         return _answer(ctx, follower, reason)
 
 
@@ -289,7 +290,7 @@ def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
     if last is None:
         if follower.refusal is not None:
             raise follower.refusal
-        if "Ctrl-C" in reason:
+        if reason == _STOPPED:
             raise KeyboardInterrupt("interrupted before the first answer")
         raise InferenceError(f"{follower.path}: {reason}, and there is no sample in it")
     run = follower.watched.finish()

@@ -233,7 +233,7 @@ def check(
 
 
 def _p_value(predictive: xr.Dataset) -> str:
-    """Return the probability of a record that agrees; a small one with that of a record which does not."""
+    """Return the probability of the record as text; beside a small one, that below which it would disagree."""
     p_value, alarm = float(predictive.overall_p_value), float(predictive.attrs["false_alarm"])
     return f"{p_value:.2g}" + f", still above the {alarm:.2g} of disagreement" * (p_value < _SMALL)
 
@@ -356,7 +356,7 @@ def _stretch(posterior: xr.DataTree, worst: xr.Dataset) -> str:
     """Return drive angles, or travels of a base that is carried, from the beginning to the end of a stretch."""
     record = record_of(posterior)
     if int(worst.worst_sweep) not in carried_sweeps(record):
-        return f"{math.degrees(worst.worst_from):.0f}° to {math.degrees(worst.worst_to):.0f}°"
+        return f"{math.degrees(worst.worst_from):.1f}° to {math.degrees(worst.worst_to):.1f}°"
     unit = str(record["base_x"].attrs.get("units", "1"))
     begin, end = (quantity(float(worst[f"worst_{name}_travel"]), unit) for name in ("from", "to"))
     return f"{begin} to {end}{' L' * (unit == '1')} of travel"
@@ -484,7 +484,8 @@ def _smooth(predictive: xr.Dataset) -> list[Finding]:
 def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[Finding]:
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
     family = posterior.attrs.get("family", GAUGE)
-    asked = draws.data_vars if family == GAUGE else family_named(family).parameters
+    named = draws.data_vars if family == GAUGE else family_named(family).parameters
+    asked = {*named} - ({*()} if family == GAUGE else {*family_named(family).roughness})
     names = [str(name) for name in draws.data_vars if name in asked and name not in known and name not in _NOISES]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
     return [Finding("set by the prior", names=", ".join(names))] * bool(names)

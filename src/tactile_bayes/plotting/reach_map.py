@@ -201,7 +201,7 @@ def _draw(
 def _median(posterior: xr.DataTree) -> tuple[Floats, Floats]:
     """Return points of the posterior's median along the touched stretch."""
     from tactile_bayes.uncertainty.band import contour_heights
-    from tactile_bayes.uncertainty.summary import reach
+    from tactile_bayes.uncertainty.rod_reach import reach
 
     x = reach(posterior)
     heights = contour_heights(posterior, x, _DRAWS)

@@ -24,7 +24,8 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.budget import uncertainty_budget
 from tactile_bayes.uncertainty.overlay import read_overlay
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
-from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
+from tactile_bayes.uncertainty.rod_reach import reach
+from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 FINDING_STEPS = 4  # number of steps that `findings_of` reports: posterior, contacts, check, and all the rest
 _GROUPS = ("posterior", "sample_stats", "posterior_predictive", "events", "observed_data", "constant_data", "prior")
@@ -41,7 +42,7 @@ class Findings(ContourFindings):
 
     interval: xr.Dataset  # posterior predictive, of the readings
     numbers: xr.Dataset  # parameters, from `uncertainty.summary`
-    budget: xr.Dataset  # of the band's width
+    budget: xr.Dataset | None  # of the band's width; None if there is no band
     checked: Check
     zero: xr.Dataset  # unloaded stretches, from `zero_load`
     comparison: xr.Dataset | None  # of families
@@ -94,7 +95,7 @@ def findings_of(
         interval=predictive_interval(posterior, probability),
         edges=edges,
         numbers=summary(posterior, probability, edges),
-        budget=uncertainty_budget(posterior, probability),
+        budget=_budget(posterior, probability),
         checked=checked,
         zero=zero,
         comparison=comparison,
@@ -106,6 +107,13 @@ def findings_of(
     )
     progress(FINDING_STEPS)
     return found
+
+
+def _budget(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
+    try:
+        return uncertainty_budget(posterior, probability)
+    except InferenceError:
+        return None
 
 
 def probability_of(posterior: xr.DataTree) -> float:

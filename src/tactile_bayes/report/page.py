@@ -87,9 +87,11 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
     }
 
 
-def _budget(findings: Findings) -> PageTable:
+def _budget(findings: Findings) -> PageTable | None:
     """Return how much of the band's width each unknown accounts for, the largest share first."""
     budget = findings.budget
+    if budget is None:
+        return None
     widths = [budget[name] for name in ("half_width", "half_width_if_all_known", "half_width_of_shape")]
     unit = shown_as("contact_x", budget.half_width.attrs, [float(widths[0])])
     rows = [["as it is", "", unit.text(float(widths[0]), 3)]]

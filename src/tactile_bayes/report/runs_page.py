@@ -29,7 +29,8 @@ from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.runs.names import MANY
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.overlay import Overlay, overlay_distance, read_overlay
-from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
+from tactile_bayes.uncertainty.rod_reach import reach
+from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 _TABLE = MANY[1]
 

@@ -40,7 +40,8 @@ from tactile_bayes.tasks import refuse_replacing, replace_together
 from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
-from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
+from tactile_bayes.uncertainty.rod_reach import reach
+from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 _POSTERIOR = "posterior.nc"
 
@@ -68,6 +69,12 @@ class ContourRun:
     messages: tuple[str, ...]  # of the check; last, what is left out, and why
     files: Mapping[str, Path]  # by content
     left_out: Mapping[str, BaseException]  # by the part that failed after sampling, which is None, or has no file
+
+    @property
+    def is_interrupted(self) -> bool:
+        """True if an interrupt ended sampling, or a part of what follows."""
+        parts = (isinstance(error, KeyboardInterrupt) for error in self.left_out.values())
+        return "interrupted" in self.posterior.attrs["message"] or any(parts)
 
 
 class RunFolder(Folder):
@@ -298,7 +305,8 @@ class _Figures:
         if self.measured.attrs["units"] == "dimensionless":
             found.pop("length", None)  # a scan would be in lengths of that rod
         contour = contours_of(draw, attrs["family"]).take(np.array(0))
-        rig = Rig(rod_with(rod_of(self.measured), found), unknown={"friction": found.get("friction", 0.0)})
+        acting = {name: found.get(name, 0.0) for name in ("friction", "suspension_compliance", "contact_compliance")}
+        rig = Rig(rod_with(rod_of(self.measured), found), unknown=acting)
         if carried_sweeps(self.measured):
             return scan(contour, rig, drive=recorded_drives(self.measured))
         direction = "both" if len(self.directions) == 2 else self.directions[0]

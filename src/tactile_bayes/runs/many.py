@@ -249,6 +249,8 @@ def _analysed(task: _Task) -> dict[str, Any]:
         )
     except (TactileBayesError, OSError) as error:
         return {"error": _reason(error), "seconds": time.monotonic() - began}
+    if run.is_interrupted:  # it is no result, and is made again
+        raise KeyboardInterrupt
     numbers = run.summary
     width = float("nan") if run.band is None else float((run.band.upper - run.band.lower).median())
     row = {

@@ -27,7 +27,8 @@ from tactile_bayes.runs.contour import ContourRun, RunFolder, complete, file_of,
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
 from tactile_bayes.tasks import alone_in, refuse_replacing
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.summary import reach, summary
+from tactile_bayes.uncertainty.rod_reach import reach
+from tactile_bayes.uncertainty.summary import summary
 
 _STATE = "stream.nc"  # file of the stream in a folder, from which a watch resumes
 _POINTS = 201  # number of grid points of the band

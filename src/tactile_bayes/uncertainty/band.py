@@ -19,9 +19,9 @@ from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import COLUMNS
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family_weights
-from tactile_bayes.uncertainty.offsets import aligned, feet_of, most_central, normal_offsets
+from tactile_bayes.uncertainty.offsets import Moves, aligned, feet_of, most_central, normal_offsets
 from tactile_bayes.uncertainty.quantiles import quantile_band
-from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
+from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach, reach
 
 _DRAWS = 4000
 
@@ -52,7 +52,8 @@ def contour_band(
         is widened about the median, everywhere by the same factor, until it contains that share of contours.
     align : {"translation", "rigid", "similarity"}, optional
         Give the band of the shape alone: each contour is first shifted, or also turned, or also scaled, onto the most
-        central one, by least squares of the distances along its normals, at these x or at 25 of them.
+        central one, by least squares of the distances along its normals over what was touched, or at these x if the
+        posterior has no events.
 
     Returns
     -------
@@ -134,11 +135,17 @@ def _heights(contours: Contour, x: Floats) -> Floats:
 def _aligned_heights(posterior: xr.DataTree, x: Floats, align: str) -> Floats:
     """Heights at x of contours moved onto the most central one; shape (contours, x)."""
     contours = contours_drawn(posterior)
-    feet = feet_of(most_central(contours, x), x)
-    moves = aligned(contours, feet, align)
+    reference = most_central(contours, x)
+    feet, moves = feet_of(reference, x), moves_onto(reference, contours, posterior, x, align)
     if align == "translation":
         return _heights(contours, x - moves.shift[0][:, None]) + moves.shift[1][:, None]
     return feet.y + normal_offsets(contours, feet._replace(slope_angle=np.zeros_like(x)), moves)
+
+
+def moves_onto(reference: Contour, contours: Contour, posterior: xr.DataTree, x: Floats, align: str) -> Moves:
+    """Return the moves of contours onto one, where it was touched, or at x if that is not known."""
+    at = reach(posterior) if "events" in posterior.children else x
+    return aligned(contours, feet_of(reference, at), align)
 
 
 def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:

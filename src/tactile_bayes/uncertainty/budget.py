@@ -6,12 +6,13 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.uncertainty.band import contours_drawn, length_unit
 from tactile_bayes.uncertainty.offsets import aligned, feet_of, most_central, normal_offsets
 from tactile_bayes.uncertainty.quantiles import quantile_band
-from tactile_bayes.uncertainty.summary import reach
+from tactile_bayes.uncertainty.rod_reach import reach
 
 _DRAWS = 2000
 _EVERY = 5  # of the grid points of `reach`, the places at which widths are measured
@@ -47,7 +48,7 @@ def uncertainty_budget(posterior: xr.DataTree, probability: float = 0.95) -> xr.
     Raises
     ------
     InferenceError
-        If the tree is no result of `infer_contour`, or the rod touches none of its contours.
+        If the tree is no result of `infer_contour`, the rod touches none of its contours, or no normal meets them all.
     ParameterError
         If the probability is not in (0, 1).
 
@@ -80,6 +81,8 @@ def uncertainty_budget(posterior: xr.DataTree, probability: float = 0.95) -> xr.
     feet = feet_of(most_central(contours, x), x)
     offsets = normal_offsets(contours, feet)
     met = np.isfinite(offsets).all(axis=0)
+    if not met.any():
+        raise InferenceError("no normal meets all contours of the posterior: there is no band")
     offsets = offsets[:, met]
     width = np.subtract(*quantile_band(offsets, probability)[[2, 0]]) / 2.0
     moved = normal_offsets(contours, feet, aligned(contours, feet, "translation"))
@@ -88,7 +91,8 @@ def uncertainty_budget(posterior: xr.DataTree, probability: float = 0.95) -> xr.
     variance = np.maximum((offsets**2).mean(axis=0), np.finfo(float).tiny)
     explained = (values @ offsets / max(len(offsets), 1)) ** 2
     together = np.linalg.lstsq(values.T, offsets, rcond=None)[0] if names else np.zeros((0, offsets.shape[1]))
-    left = ((offsets - values.T @ together) ** 2).mean(axis=0)
+    freedom = max(len(offsets) - len(names) - 1, 1)
+    left = ((offsets - values.T @ together) ** 2).sum(axis=0) / freedom
 
     def typical(remaining: object) -> object:
         return np.nanmedian(width * np.sqrt(np.clip(np.asarray(remaining) / variance, 0.0, 1.0)), axis=-1)

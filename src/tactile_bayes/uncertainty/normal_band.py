@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.uncertainty.band import contours_drawn, grid_points, length_unit
-from tactile_bayes.uncertainty.offsets import aligned, feet_of, most_central, normal_offsets
+from tactile_bayes.uncertainty.band import contours_drawn, grid_points, length_unit, moves_onto
+from tactile_bayes.uncertainty.offsets import feet_of, most_central, normal_offsets
 from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
@@ -74,7 +74,8 @@ def normal_band(
     if not isinstance(reference, Contour) or reference.shape != ():
         raise ParameterError(f"reference is {reference!r}: give one contour, or none for the most central draw")
     feet = feet_of(reference, at)
-    offsets = normal_offsets(contours, feet, None if align is None else aligned(contours, feet, align))
+    moves = None if align is None else moves_onto(reference, contours, posterior, at, align)
+    offsets = normal_offsets(contours, feet, moves)
     share = np.isfinite(offsets).mean(axis=0)
     lower, median, upper = quantile_band(offsets, probability, simultaneous)
     sin, cos = np.sin(feet.slope_angle), np.cos(feet.slope_angle)

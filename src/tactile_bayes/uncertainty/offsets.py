@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_choice
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.base import Locus
@@ -23,7 +23,7 @@ _SLOWEST = float(np.finfo(float).tiny)
 # Distance of a point from a normal, relative to the lengths involved, beyond which the normal misses the contour.
 _MISSED = 1e-9
 _FEET = 25  # number of feet by which contours are moved
-_ROUNDS = 2  # of Gauss–Newton: the error of each is the square of that before
+_ROUNDS, _SHARES = 3, (1.0, 0.5, 0.25, 0.125)  # Gauss–Newton steps, and the shares of each that are tried
 # Share of the largest singular value below which a move leaves the contour as it is, like a turn of a circle.
 _INVARIANT = 1e-3
 
@@ -51,6 +51,11 @@ class Moves(NamedTuple):
         cos, sin = np.cos(self.turn)[:, None], np.sin(self.turn)[:, None]
         back_x, back_y = self.about[0] + cos * x + sin * y, self.about[1] - sin * x + cos * y
         return Feet(back_x, back_y, feet.slope_angle - self.turn[:, None])
+
+    def where(self, kept: Flags, others: Moves) -> Moves:
+        """Return these moves of the contours that are kept, and others of the others."""
+        values = zip(self[1:], others[1:], strict=True)
+        return Moves(self.about, *(np.where(kept, own, other) for own, other in values))
 
     def then(self, shift: Floats, turn: Floats, growth: Floats) -> Moves:
         """Return these moves followed by small ones about the same point."""
@@ -91,13 +96,28 @@ def aligned(contours: Contour, feet: Feet, alignment: str) -> Moves:
     # A turn and a growth count as they move the feet.
     size = (float(np.sqrt(np.nanmean(x**2 + y**2))) if there.any() else 0.0) or 1.0
     effects = np.stack([-sin, cos, (sin * y + cos * x) / size, (cos * y - sin * x) / size])[: ALIGNMENTS[alignment]]
-    for _ in range(_ROUNDS):
-        offsets = normal_offsets(contours, feet, moves)
-        met = np.isfinite(offsets).all(axis=0)
-        steps = np.zeros((4, count))
-        steps[: len(effects)] = -np.linalg.pinv(effects[:, met].T, rcond=_INVARIANT) @ offsets[:, met].T
-        moves = moves.then(steps[:2], steps[2] / size, steps[3] / size)
+    for count_of in range(2, ALIGNMENTS[alignment] + 1):  # a shift first: a turn that is large is no small one
+        for _ in range(_ROUNDS):
+            moves = _nearer(contours, feet, moves, effects[:count_of], size)
     return moves
+
+
+def _nearer(contours: Contour, feet: Feet, moves: Moves, effects: Floats, size: float) -> Moves:
+    """Return moves after a Gauss–Newton step, or the part of it by which a contour comes nearer to the feet."""
+    offsets = normal_offsets(contours, feet, moves)
+    met = np.isfinite(offsets).all(axis=0)
+    steps = np.zeros((4, len(offsets)))
+    steps[: len(effects)] = -np.linalg.pinv(effects[:, met].T, rcond=_INVARIANT) @ offsets[:, met].T
+    steps[2:] /= size
+    best, least = moves, np.sum(offsets[:, met] ** 2, axis=1)
+    for share in _SHARES:
+        tried = moves.then(share * steps[:2], share * steps[2], share * steps[3])
+        total = np.sum(normal_offsets(contours, feet, tried)[:, met] ** 2, axis=1)
+        better = total < least  # not where a normal no longer meets its contour
+        best, least = best.where(~better, tried), np.where(better, total, least)
+        if better.all():
+            break
+    return best
 
 
 def normal_offsets(contours: Contour, feet: Feet | Locus, moves: Moves | None = None) -> Floats:

@@ -16,7 +16,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.record.points import read_points
 from tactile_bayes.uncertainty.band import contour_band, length_unit
-from tactile_bayes.uncertainty.summary import reach
+from tactile_bayes.uncertainty.rod_reach import reach
 
 
 @dataclass(frozen=True, eq=False)

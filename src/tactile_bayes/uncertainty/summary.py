@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Floats
-from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.uncertainty.gap import gap, has_gap
 from tactile_bayes.uncertainty.quantiles import central_levels
+from tactile_bayes.uncertainty.rod_reach import events_of
 
 
 def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset | None = None) -> xr.Dataset:
@@ -37,20 +36,4 @@ def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset
 
 def gap_if_any(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
     """Return the gap, or None where the sweeps leave none between them (`has_gap`)."""
-    return gap(posterior, probability) if has_gap(_events(posterior)) else None
-
-
-def reach(posterior: xr.DataTree) -> Floats:
-    """Return grid points, (201,), from the 5 % to the 95 % quantile of the events' x, for the band of a run."""
-    events = _events(posterior)
-    x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
-    if not np.isfinite(x).any():
-        raise InferenceError("the rod touches none of the posterior's contours: there is no touched stretch for a band")
-    lo, hi = np.nanquantile(x, [0.05, 0.95])
-    return np.linspace(lo, hi, 201)
-
-
-def _events(posterior: xr.DataTree) -> xr.Dataset:
-    if "events" not in posterior.children:
-        raise InferenceError("the posterior holds no events: first contacts and snap-offs of its contours are missing")
-    return posterior["events"].to_dataset()
+    return gap(posterior, probability) if has_gap(events_of(posterior)) else None

@@ -6,8 +6,12 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.optimize import brentq
 
 from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.mechanics.branches.line import lines_through
+from tactile_bayes.mechanics.paths import trace
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Motion, Translation, scan
+from tactile_bayes.sweep.path import to_sweep_frame
 
 COMPLIANCE = 0.02
 # An upright rod whose tip sticks where the drive turns back, if there is friction.
@@ -86,3 +90,16 @@ def test_an_object_that_does_not_yield_is_the_limit_of_one_that_hardly_does():
     rigs = [Rig(unknown={"contact_compliance": c, "friction": 0.2}) for c in (0.0, 1e-9)]
     stiff, hardly = (scan(Circle(0.4, q=0.6), rig, drive_step=0.1).record for rig in rigs)
     np.testing.assert_allclose(hardly.force_y, stiff.force_y, rtol=0, atol=1e-6)
+
+
+def test_legs_of_a_rod_that_rolls_on_an_object_that_yields_are_as_accurate_as_others():
+    angle = np.r_[np.linspace(0.4, 2.0, 120), np.linspace(1.99, 0.4, 120)]
+    line = lines_through(np.stack([0.0 * angle, 0.0 * angle, angle], axis=1), 1.0, backward=False)
+    frame = to_sweep_frame(Parabola(0.5, q=0.3), (0.0, 0.0), "forward", Rod())
+    for compliance in (0.0, 0.002, 0.005):
+        options = {"friction_angle": np.arctan(0.3), "contact_compliance": compliance, "lines": line.lines[None]}
+        fine, coarse = (trace(frame, tolerance=tolerance, **options) for tolerance in (None, np.full(3, 1e-4)))
+        assert [mode.sticks and not mode.tip for mode in fine.modes()[0]] == [False, True, False]
+        loads = fine.observables(line.travels)
+        assert np.abs(loads).max() > 10.0
+        np.testing.assert_allclose(coarse.observables(line.travels), loads, rtol=0, atol=1e-5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -112,12 +112,12 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
 
 
 def optimum_beside(
-    model: ContourModel, start: Mapping[str, float], rng: np.random.Generator, deadline: Deadline = NEVER
+    model: ContourModel, starts: Sequence[Mapping[str, float]], rng: np.random.Generator, deadline: Deadline = NEVER
 ) -> ContourOptimum:
-    """Return the better of the optima from Step 2's contacts and, for a contour of its family, from a start by name."""
+    """Return the best of the optima from Step 2's contacts and, for a contour of its family, from starts by name."""
     search = _Search(model, rng, deadline)
     best: Optimum | None = None
-    for found in optima(search.residuals, search.beside(start), *search.limits):
+    for found in optima(search.residuals, search.beside(starts), *search.limits):
         best = found if best is None or found.cost < best.cost else best
         if best.fits:
             break
@@ -185,15 +185,16 @@ class _Search:
         """Return the residuals of events, shape (n, events)."""
         return self.residuals(coordinates)[:, self.measured.size :]
 
-    def beside(self, start: Mapping[str, float]) -> Iterator[Floats]:
-        """Yield coordinates of the contour fitted to Step 2's contacts, without and with the rig's medians, and of a
-        start, where medians stand for what it does not name."""
+    def beside(self, starts: Sequence[Mapping[str, float]]) -> Iterator[Floats]:
+        """Yield coordinates of the contour fitted to Step 2's contacts, without and with the rig's medians, and of
+        starts, where medians stand for what they do not name."""
         rig = dict(zip(self.model.forward_parameters, self.usual.tolist(), strict=True))
         for fitted in (self._at_contacts(), self._at_contacts(rig)):
             if fitted is not None:
                 yield fitted
-        if fitted is None or set(self.model.family.parameters) <= set(start):
-            yield self.coordinates.of(np.array([start.get(name, value) for name, value in rig.items()]))
+        for start in starts:
+            if fitted is None or set(self.model.family.parameters) <= set(start):
+                yield self.coordinates.of(np.array([start.get(name, value) for name, value in rig.items()]))
 
     def starts(self) -> Iterator[Floats]:
         """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""

@@ -128,11 +128,11 @@ def balance(scene: Scene, at: Equilibrium) -> tuple[Balance, _Equations]:
     contact, size = contact_at(scene, at), max(at.force, 0.0)
     sin_gamma, cos_gamma = math.sin(contact.friction_angle), math.cos(contact.friction_angle)
     yielding = scene.rig.yielding
-    spot = narrower(scene.outline, place(scene.outline, contact.p), contact.arclength)
-    spot = further(spot, yielding * size * cos_gamma)
+    at_rest = narrower(scene.outline, place(scene.outline, contact.p), contact.arclength)
+    spot = further(at_rest, yielding * size * cos_gamma)
     sin, cos = spot.sin * cos_gamma + spot.cos * sin_gamma, spot.cos * cos_gamma - spot.sin * sin_gamma
     force = _Force(size, sin, cos, sin_gamma, cos_gamma)
-    by_p, by_q = moves(scene.phase, spot.speed)
+    by_p, by_q = moves(scene.phase, at_rest.speed)
     here, pose_by_p, pose_by_q, by_force = _posed(scene, contact, size, by_p)
     first, second = _motion(scene, spot, force, by_p, pose_by_p), _motion(scene, spot, force, by_q, pose_by_q)
     loaded = _Motion(0.0, yielding * cos_gamma, 0.0, 0.0, by_force)
