@@ -83,10 +83,12 @@ class ContourModel:
             )
         self.found = self._zero_load()
         self.zero, noise_found = self._unloaded()
-        is_white = (noise_found > 0.0) & (not unknowns.remember)  # else readings that decay count as unloaded
+        is_white = (noise_found > 0.0) & (not unknowns.memory)  # else readings that decay count as unloaded
         rough = np.where(is_white, noise_found, self._rough_noise())
         largest = np.nan_to_num(np.abs(self.likelihood.measured)).max(axis=0)
         self.deviation = np.where(self.present, np.maximum(rough, np.maximum(1e-7 * largest, 1e-12)), 1.0)
+        # What play leaves of a load that has ended, at most; zeros of unloaded samples are off by that.
+        self.left_by_play = unknowns.most_play(priors) * largest
         self.likelihood.noise = np.where(self.present, rough, np.inf)
 
     @property
@@ -110,7 +112,8 @@ class ContourModel:
         present = self.present
         measured, zero = self.likelihood.measured[:, present], self.zero[present]
         zero = np.where(np.isfinite(zero), zero, np.median(measured, axis=0))
-        squared_distance = np.square((measured - zero) / self.deviations[:, present]).sum(axis=1)
+        off = np.hypot(self.deviations, self.left_by_play)[:, present]
+        squared_distance = np.square((measured - zero) / off).sum(axis=1)
         return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
 
     @property

@@ -93,7 +93,7 @@ class Experiment:
     @cached_property
     def shortened(self) -> Experiment:
         """The experiment with the samples that the likelihood takes, fewer for a long record, but for memory."""
-        if self.unknowns.remember:
+        if self.unknowns.memory:
             return self
         rubs = bool(self.unknowns.friction) or "friction" in self.unknowns.names
         record, cell = shortened(self.record, self.noise.cell, rubs)

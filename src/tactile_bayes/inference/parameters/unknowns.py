@@ -74,15 +74,21 @@ class Unknowns:
         return self.known.get("friction", 0.0)
 
     @property
-    def remember(self) -> bool:
-        """True if the load cell has a lag or play, or may have, so that a sample depends on all before it."""
-        return bool(memory_in(self.sensor, self.known, dict.fromkeys(self.names, True)))
+    def memory(self) -> set[str]:
+        """Kinds of memory that the load cell has or may have, by which a sample depends on all before it."""
+        return memory_in(self.sensor, self.known, dict.fromkeys(self.names, True))
 
     def longest_lag(self, priors: Mapping[str, Distribution]) -> float:
         """Return the lag of the readings, if it is unknown its median in the prior and two standard deviations."""
         if "lag" in self.names:
             return float(priors["lag"].median() + 2.0 * priors["lag"].std())  # type: ignore[attr-defined]
         return self.known.get("lag", self.sensor.get("lag", 0.0))
+
+    def most_play(self, priors: Mapping[str, Distribution]) -> float:
+        """Return the play of the readings over the largest load, if it is unknown its 95 % quantile in the prior."""
+        if "play" in self.names:
+            return float(priors["play"].ppf(0.95))  # type: ignore[attr-defined]
+        return self.known.get("play", self.sensor.get("play", 0.0))
 
     @property
     def of_path(self) -> tuple[str, ...]:

@@ -325,7 +325,9 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
 
 
 def _zeros(model: ContourModel) -> dict[str, float]:
-    """Return inferred biases as estimated from the unloaded samples, by name."""
+    """Return inferred biases as estimated from the unloaded samples, by name; none beside play, which hides them."""
+    if model.left_by_play.any():
+        return {}
     names, stated = model.unknowns.names, model.noise.cell.bias
     units = [model.unknowns.units.get(name, np.nan) for name in GROUPS["bias"]]
     shown = zip(GROUPS["bias"], model.zero * np.array(units) - np.array(stated), strict=True)
