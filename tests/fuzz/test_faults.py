@@ -23,6 +23,7 @@ from tactile_bayes.cli.app import _message
 from tactile_bayes.contours import Parabola
 from tactile_bayes.datasets import shard
 from tactile_bayes.diagnostics import Check
+from tactile_bayes.diagnostics.findings import Finding
 from tactile_bayes.diagnostics.inspection import inspect_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.coordinates.base import Coordinates
@@ -94,10 +95,10 @@ def cheap(monkeypatch):
         (contour, "contour_band", data),
         (contour, "reach", data),
         (contour, "gap_if_any", lambda k: None),
-        (contour, "check", lambda k: Check((f"message {k}",), False, None)),
+        (contour, "check", lambda k: Check((Finding("reservation", summary=f"message {k}"),), False, None)),
         (contour, "summary", data),
         (rig, "calibrate_rig", lambda k: Rig(calibration=replace(CALIBRATION, posterior=tree(k)))),
-        (rig, "check", lambda k: Check((f"message {k}",), False, None)),
+        (rig, "check", lambda k: Check((Finding("reservation", summary=f"message {k}"),), False, None)),
         (rig, "summary", data),
         (writing, "findings_of", lambda k: None),
         (writing, "page_of", lambda k: {}),

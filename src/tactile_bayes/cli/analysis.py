@@ -260,7 +260,8 @@ def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float
         fates = Counter(run.contacts.status.values.tolist()).most_common()
         words = "Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates)
         chance = run.contacts.attrs.get("misfit_probability")
-        if chance is not None and chance == chance:
+        is_known = run.checked is None or run.checked.knows_misfit
+        if is_known and chance is not None and chance == chance:
             words += f"; noise of the inferred scale explains their misfit with probability {chance:.2g}"
         yield words
     elif "contacts" not in run.left_out:  # else the messages say so

@@ -102,11 +102,14 @@ class Check:
 
         Attributes: `passed` (0 or 1; 0 also if the check was not made), `not_checked`, why it was not made (there are
         too few loaded samples), else empty, `false_alarm` (the probability in effect), `predictions` (their number).
+    knows_misfit : bool
+        False if the misfit of single samples says nothing, since a reading depends on those before it (lag, play).
     """
 
     messages: tuple[Finding, ...]
     is_well: bool
     predictive: xr.Dataset | None
+    knows_misfit: bool = True
 
 
 def check(
@@ -229,7 +232,7 @@ def check(
     against += [*_prior_dominated(posterior, known=beyond), *_going_back(posterior, record)]
     if is_well:
         against += _width_of_band(posterior)
-    return Check(tuple(against), is_well, predictive)
+    return Check(tuple(against), is_well, predictive, not _memory(posterior, record))
 
 
 def _p_value(predictive: xr.Dataset) -> str:

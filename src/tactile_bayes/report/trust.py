@@ -164,7 +164,7 @@ def contacts_messages(findings: Findings) -> list[str]:
     said = ["Single samples: " + ", ".join(f"{count} {fate}" for fate, count in fates) + "."]
     attrs = contacts.attrs
     probability, score = (float(attrs.get(key, np.nan)) for key in ("misfit_probability", "axial_score"))
-    if np.isfinite(probability):
+    if np.isfinite(probability) and findings.checked.knows_misfit:
         noise, but = "noise", ""
         if findings.is_rejected:
             noise = "noise of the inferred scale"
