@@ -13,7 +13,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.comparison.families import SHAPES
-from tactile_bayes.diagnostics.inspection.inspection import inspect_record
+from tactile_bayes.diagnostics.inspection.inspection import Inspection, inspect_record
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import ParameterError, StudyError, TactileBayesError
 from tactile_bayes.inference.contour import sampled
@@ -24,15 +24,14 @@ from tactile_bayes.inference.parameters.unknowns import belongs
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
 from tactile_bayes.record import CHANNELS, rod_of
-from tactile_bayes.rig.parameters import MEMORY, STANDARD
+from tactile_bayes.rig.parameters import COMPLIANCES, MEMORY, STANDARD
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.rig.unknown import DEFAULT
 from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
-_YIELDING = ("suspension_compliance", "contact_compliance")
-_MORE = ("base", "drift", "gain", *MEMORY, *_YIELDING, "rest_curvature", "taper", "stem", "length")
+_MORE = ("base", "drift", "gain", *MEMORY, *COMPLIANCES, "rest_curvature", "taper", "stem", "length")
 _UNKNOWNS = (*STANDARD, *_MORE)
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 
@@ -118,8 +117,11 @@ def band_by_assumption(
     )
 
 
-def alternatives_of(experiment: Experiment) -> list[Alternative]:
-    """Return the experiments that differ in one assumption, except those that the record cannot identify."""
+def alternatives_of(experiment: Experiment, seen: Inspection | None = None) -> list[Alternative]:
+    """Return the experiments that differ in one assumption, except those that the record cannot identify.
+
+    What an inspection of the record has seen is looked up if it is not given.
+    """
     names, found = set(experiment.unknowns.names), []
     for group in _UNKNOWNS:
         members = {name for name in names if belongs(name, group)}
@@ -127,7 +129,7 @@ def alternatives_of(experiment: Experiment) -> list[Alternative]:
             found.append(Alternative(f"{group} as stated", "fixed", _as_stated(experiment, members)))
         elif not any(belongs(name, group) for name in experiment.unknowns.known):
             found += _added(experiment, group)
-    found += _limited(experiment)
+    found += _limited(experiment, seen or inspect_record(experiment.record, experiment.rig))
     families = [name for name in SHAPES if name != experiment.own_family.name]
     return [*found, *(Alternative(f"family {name}", "family", replace(experiment, family=name)) for name in families)]
 
@@ -162,10 +164,10 @@ def stated_cell(experiment: Experiment) -> LoadCell:
     return experiment.rig.load_cell or LoadCell.from_record(experiment.record) or LoadCell()
 
 
-def _limited(experiment: Experiment) -> list[Alternative]:
+def _limited(experiment: Experiment, seen: Inspection) -> list[Alternative]:
     """Return the alternative in which readings that stay at their largest value are cut off there; none without."""
     record, cell = experiment.record, stated_cell(experiment)
-    at_end = inspect_record(record, experiment.rig).samples["cut_off"].values
+    at_end = seen.samples["cut_off"].values
     ends: dict[str, float] = {}
     for index, name in enumerate(CHANNELS):
         if at_end[:, index].any() and not np.isfinite(cell.limit[index]):

@@ -76,15 +76,15 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
     drawn = {str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}
     starts = [{**stated, **drawn}, drawn]  # what is added as stated, and at its prior's median
-    seen = inspect_record(experiment.record, experiment.rig).messages
-    if misread := [finding for finding in seen if _is_misread(finding)]:
+    seen = inspect_record(experiment.record, experiment.rig)
+    if misread := [finding for finding in seen.messages if _is_misread(finding)]:
         return _of_readings(misread[:1])
     deadline = Deadline.after(_SECONDS)
     own = _optimum(experiment, starts, seed, deadline)
-    if own.fits and (outliers := [finding for finding in seen if finding.kind == "outlier"]):
+    if own.fits and (outliers := [finding for finding in seen.messages if finding.kind == "outlier"]):
         return _of_readings(outliers)  # its optimum bears them, and the posterior does not
     found = []
-    for each in alternatives_of(experiment):
+    for each in alternatives_of(experiment, seen):
         if each.kind != "fixed":
             try:
                 found.append((each, _optimum(each.experiment, starts, seed, deadline)))

@@ -487,8 +487,9 @@ def _smooth(predictive: xr.Dataset) -> list[Finding]:
 def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[Finding]:
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
     family = posterior.attrs.get("family", GAUGE)
-    named = draws.data_vars if family == GAUGE else family_named(family).parameters
-    asked = {*named} - ({*()} if family == GAUGE else {*family_named(family).roughness})
+    asked = set(map(str, draws.data_vars))
+    if family != GAUGE:
+        asked = {*family_named(family).parameters} - {*family_named(family).roughness}
     names = [str(name) for name in draws.data_vars if name in asked and name not in known and name not in _NOISES]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
     return [Finding("set by the prior", names=", ".join(names))] * bool(names)

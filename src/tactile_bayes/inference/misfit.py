@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from tactile_bayes.inference.parameters.unknowns import belongs
+from tactile_bayes.rig.parameters import COMPLIANCES
 
 # Advice if loads contradict one another for any contour: the cause is the rig.
 CHECK_RIG = (
@@ -18,9 +19,8 @@ NO_LOAD = (
 )
 GAUGE = "gauge"  # name of the family of a gauge, whose contour is known
 _OF_ROD = ("rest_curvature", "taper", "stem", "length")
-_YIELDING = ("suspension_compliance", "contact_compliance")
 # Unknowns of a rig, or groups of them, that may cause a misfit.
-_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", *_YIELDING, "lag", "play", *_OF_ROD)
+_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", *COMPLIANCES, "lag", "play", *_OF_ROD)
 _SMOOTH = "shape-free"
 
 

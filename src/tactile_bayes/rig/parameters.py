@@ -246,6 +246,8 @@ GROUPS = {
     "gauge": ("gauge_x", "gauge_y"),
     "discrepancy": ("discrepancy_scale", "discrepancy_length"),
 }
+# Ways in which what is not the rod yields.
+COMPLIANCES = ("suspension_compliance", "contact_compliance")
 # Parameters of the memory of a load cell, and all that replace what it states of itself.
 MEMORY = ("lag", "play")
 SENSOR = (*GROUPS["moment_curve"], *MEMORY)
@@ -261,7 +263,7 @@ STANDARD = (
     "taper_error",
 )
 # Parameters that are zero or positive, and may be zero.
-MAY_VANISH = ("friction", "suspension_compliance", "contact_compliance", "taper", "stem", *MEMORY)
+MAY_VANISH = ("friction", *COMPLIANCES, "taper", "stem", *MEMORY)
 
 
 def parameter_named(name: str) -> Parameter | None:

@@ -31,6 +31,7 @@ from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
+from tactile_bayes.rig.parameters import COMPLIANCES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import rod_with
 from tactile_bayes.runs.folder import Folder, panels
@@ -305,7 +306,7 @@ class _Figures:
         if self.measured.attrs["units"] == "dimensionless":
             found.pop("length", None)  # a scan would be in lengths of that rod
         contour = contours_of(draw, attrs["family"]).take(np.array(0))
-        acting = {name: found.get(name, 0.0) for name in ("friction", "suspension_compliance", "contact_compliance")}
+        acting = {name: found.get(name, 0.0) for name in ("friction", *COMPLIANCES)}
         rig = Rig(rod_with(rod_of(self.measured), found), unknown=acting)
         if carried_sweeps(self.measured):
             return scan(contour, rig, drive=recorded_drives(self.measured))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import contour_draws
@@ -84,9 +85,8 @@ def uncertainty_budget(posterior: xr.DataTree, probability: float = 0.95) -> xr.
     if not met.any():
         raise InferenceError("no normal meets all contours of the posterior: there is no band")
     offsets = offsets[:, met]
-    width = np.subtract(*quantile_band(offsets, probability)[[2, 0]]) / 2.0
-    moved = normal_offsets(contours, feet, aligned(contours, feet, "translation"))
-    shape = np.subtract(*quantile_band(moved, probability)[[2, 0]]) / 2.0
+    width = _half_width(offsets, probability)
+    shape = _half_width(normal_offsets(contours, feet, aligned(contours, feet, "translation")), probability)
     offsets = offsets - offsets.mean(axis=0)
     variance = np.maximum((offsets**2).mean(axis=0), np.finfo(float).tiny)
     explained = (values @ offsets / max(len(offsets), 1)) ** 2
@@ -109,3 +109,9 @@ def uncertainty_budget(posterior: xr.DataTree, probability: float = 0.95) -> xr.
         coords={"unknown": names},
         attrs={"probability": probability},
     )
+
+
+def _half_width(offsets: Floats, probability: float) -> Floats:
+    """Return half the width of the band of offsets, (draws, places), at each place."""
+    lower, _, upper = quantile_band(offsets, probability)
+    return np.asarray(0.5 * (upper - lower))

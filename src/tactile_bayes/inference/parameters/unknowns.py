@@ -21,7 +21,7 @@ from tactile_bayes.load_cell.memory import remembered
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
-from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, SENSOR, parameter_named
+from tactile_bayes.rig.parameters import BASE, COMPLIANCES, GROUPS, PARAMETERS, SENSOR, parameter_named
 from tactile_bayes.rig.stated import Stated, memory_in, sensor_values, stated_values, unit_of
 from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
@@ -34,8 +34,7 @@ _SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps i
 # Parameters of the noise, which are none of the forward model.
 _OF_NOISE = (*GROUPS["discrepancy"], "noise_scale", "moment_noise", "force_noise")
 # Parameters that change the path or the reading of the drive angle, and their names in `RigValues`.
-_RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "friction")}
-_RIG |= {name: name for name in ("suspension_compliance", "contact_compliance")}
+_RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "friction", *COMPLIANCES)}
 _RIG["backlash"] = "drive_angle_backlash"
 # Groups that change only what the load cell senses, not the path.
 _SENSED = ("bias", "drift", "gain", "lever", *SENSOR)
