@@ -45,3 +45,23 @@ def test_a_rod_without_a_length_gives_the_shape_of_the_one_in_the_file(tmp_path)
     assert rod_of(with_rod(make_record(columns()), Rod(taper=0.4))) == Rod(taper=0.4)
     with refused(RecordError, "but"):
         read_record(tmp_path / "record.csv", Rig(rod=Rod(2 * WIRE.length, 1.0)))
+
+
+def test_each_row_may_be_a_touch_and_a_condition_takes_rows(tmp_path):
+    path = tmp_path / "touches.csv"
+    path.write_text("x [mm],y [mm],M [N mm],ring,ok\n1,2,3,0,yes\n4,5,6,1,no\n7,8,9,2,yes\n-1,0,2,3,yes\n")
+    columns = {"base_x": "x", "base_y": "y", "holding_moment": "M", "drive_angle": "1[rad]", "direction": "forward"}
+    file = {**columns, "split_sweeps": "rows", "where": "ring >= 1 and ok == yes", "missing": ["force_x", "force_y"]}
+    rig = Rig(WIRE, file=file)
+    record = read_record(path, rig)
+    assert record.sweep.values.tolist() == [0, 1]
+    np.testing.assert_allclose(record.base_x, [7e-3, -1e-3])
+    rig.write(tmp_path / "rig.toml")
+    assert Rig.read(tmp_path / "rig.toml").format == rig.format
+    xr.testing.assert_identical(read_record(path, Rig.read(tmp_path / "rig.toml")), record)
+
+
+@pytest.mark.parametrize("where", ["ring", "rign > 0", "ring > 7", "ring > many"])
+def test_a_condition_that_chooses_no_rows_is_refused(path, where):
+    with refused(RecordError, "where"):
+        read_record(path, Rig(WIRE, file={**RIG.format.table, "where": where}))

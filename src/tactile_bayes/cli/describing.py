@@ -146,8 +146,10 @@ def _words(rig: Rig, said: dict[str, str]) -> Iterator[Any]:
     entries = {} if cell is None else cell.entries()
     yield f"load cell   {_list(entries) or 'as the record states, or its noise is found'}"
     yield f"columns     {_list(rig.format.columns) or 'as in the file'}"
+    if rig.format.where:
+        yield f"rows        where {rig.format.where}"
     if rig.format.split_sweeps:
-        yield "sweeps      found by the turns of the drive"
+        yield f"sweeps      {'each row' if rig.format.split_sweeps == 'rows' else 'found by the turns of the drive'}"
     if rig.format.missing:
         yield f"missing     {', '.join(rig.format.missing)}"
     yield ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -70,6 +71,14 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
         sweep[begin:end] = number
         direction[begin:end] = "forward" if is_forward else "backward"
     return _with_sweeps(table, sweep, direction)
+
+
+def each_row(table: Table) -> Table:
+    """Add sweeps to a table of touches, each row one of them."""
+    if "sweep" in table.columns:
+        what = "is there already: do without split_sweeps, or remove the column"
+        raise table.source.column_error("sweep", what)
+    return replace(table, columns={**table.columns, "sweep": (np.arange(table.samples), {})})
 
 
 def _finite(name: str, table: Table) -> Floats:

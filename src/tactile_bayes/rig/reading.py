@@ -18,7 +18,8 @@ from tactile_bayes.record.bag import is_bag
 from tactile_bayes.record.construction import completed_record, table_of_columns
 from tactile_bayes.record.files import read_table
 from tactile_bayes.record.origin import ORIGIN, renamed
-from tactile_bayes.record.sweep_segments import split_at_turns
+from tactile_bayes.record.rows import rows_where
+from tactile_bayes.record.sweep_segments import each_row, split_at_turns
 from tactile_bayes.record.table import Table
 from tactile_bayes.record.units import assumed_units, in_units_of_record, with_rod
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -177,8 +178,10 @@ def record_in(table: Table, rig: Rig) -> xr.Dataset:
         columns = {**columns, "drive_angle": str(table.attrs["drive_angle"])}
         attrs = {name: value for name, value in table.attrs.items() if name != "drive_angle"}
         table = replace(table, attrs=attrs)
-    table = in_units_of_record(renamed(table, columns), rod)
-    if rig.format.split_sweeps:
+    table = in_units_of_record(renamed(rows_where(table, rig.format.where), columns), rod)
+    if rig.format.split_sweeps == "rows":
+        table = each_row(table)
+    elif rig.format.split_sweeps:
         stated = table.attrs.get("rod_length", 1.0) if rod is None else rod.length
         table = split_at_turns(table, float(stated) if isinstance(stated, int | float) else 1.0)
     frame = None if cell is None else cell.frame

@@ -23,7 +23,7 @@ from tactile_bayes.record.points import read_points
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED
 from tactile_bayes.record.spelling import refuse_unknown_keys
-from tactile_bayes.rig.file_format import FileFormat
+from tactile_bayes.rig.file_format import OPTIONS, FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import NOTHING
@@ -44,7 +44,7 @@ ROD_UNITS = {
 TABLES = {
     "rod": (*ROD_UNITS, "rigidity_profile", "rest_shape_modes", "taper_deviation", "shape"),
     "load_cell": ("frame", *LOAD_CELL_UNITS, *SEVERAL),
-    "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), "split_sweeps", "missing"),
+    "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), *OPTIONS),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
 }

@@ -160,6 +160,15 @@ def by_table_and_exactly(record, contours, rig, **options):
 
 
 @pytest.mark.slow
+def test_a_sensor_that_counts_has_the_accuracy_of_one_that_does_not():
+    counting = LoadCell(moment_noise=3e3, gain=((1e6, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    record = scan(Parabola(0.7, 0.4), drive_step=0.05).record
+    counted = record.assign(holding_moment=1e6 * record.holding_moment)
+    one = Parabola(np.array([0.7]), np.array([0.4]))
+    told, _ = RecordLikelihood(record, LoadCell(moment_noise=3e-3)).predict(one)
+    np.testing.assert_array_equal(RecordLikelihood(counted, counting).predict(one)[0][..., 0], told[..., 0])
+
+
 def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
     """First contact decides in which sense friction acts: here both occur, on a bent rod with a stem."""
     rod = Rod(rest_curvature=lambda s: -3.4 / (1.0 + np.exp(-(s - 0.55) / 0.08)), stem=0.03)

@@ -51,6 +51,22 @@ def test_predicted_loads_are_those_of_a_scan(drive):
     np.testing.assert_allclose(loads[0], np.stack([record[name] for name in CHANNELS], axis=-1), atol=1e-7)
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_drive_that_begins_in_contact_was_turned_in(friction, exact):
+    """Against a scan of both motions, of whose record the second is left."""
+    x, angle = np.linspace(0.2, -0.1, 40), np.linspace(0.7, 1.65, 40)
+    drive = tb.Motion(np.r_[np.full(40, 0.2), x[1:]], 0.0, np.r_[angle, np.full(39, 1.65)])
+    record = tb.scan(CIRCLE, tb.Rig(unknown={"friction": friction}), drive=drive).record
+    moved = record.isel(sample=record.base_x.values < 0.2)
+    assert moved.holding_moment.values[0] > 0.1
+    likelihood = RecordLikelihood(moved, CELL, friction, exact=exact)
+    loads, reached = likelihood.predict(ONE, RigValues(friction=friction))
+    assert reached.all()
+    known = np.stack([moved[name] for name in CHANNELS], axis=-1)
+    np.testing.assert_allclose(loads[0], known, atol=1e-7 if exact else 1e-4)
+
+
 def test_an_encoder_offset_is_that_of_the_clamp():
     """A rod that is clamped otherwise than its reading says gives the loads of a drive at that angle."""
     offset = 0.02

@@ -88,10 +88,11 @@ class RecordLikelihood:
     @noise.setter
     def noise(self, deviation: Floats) -> None:
         self._noise = np.asarray(deviation, dtype=float)
-        largest = np.maximum(np.nan_to_num(np.abs(self.measured)).max(axis=0), 1.0)
+        per_load = np.abs(self.load_cell.own_gains)  # of a sensor that counts, in counts
+        largest = np.maximum(np.nan_to_num(np.abs(self.measured)).max(axis=0) / per_load, 1.0)
         readings = len(self.measured) if self.blocks is None else float(self.blocks.readings.sum())
         share = _UNFELT * math.sqrt(min(1.0, 360.0 / readings))
-        self._tolerance = np.maximum(share * self._noise, _LEAST * largest)
+        self._tolerance = np.maximum(share * self._noise / per_load, _LEAST * largest)
         self._tolerated_share = float((self._tolerance / largest).min())
 
     def paths(

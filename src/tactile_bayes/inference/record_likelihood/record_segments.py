@@ -10,7 +10,7 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.discrepancy import Course
-from tactile_bayes.mechanics.branches.line import LINE_COLUMNS, lines_through
+from tactile_bayes.mechanics.branches.line import LINE_COLUMNS, lines_through, turned_in
 from tactile_bayes.mechanics.branches.sweeps import Segments
 from tactile_bayes.reconstruction import contact_sides, drive_histories, least_turn
 from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of
@@ -95,7 +95,7 @@ class RecordSegments:
         own, noise = self.samples[k], max(load_cell.drive_angle_noise, load_cell.drive_angle_resolution)
         if np.ptp(once[:, 2]) <= _SCATTER * noise:
             once[:, 2] = once[:, 2].mean()
-        path = lines_through(once, length, backward=bool(self.backward[k]), off=max(_OFF, 3.0 * noise))
+        path = turned_in(lines_through(once, length, backward=bool(self.backward[k]), off=max(_OFF, 3.0 * noise)))
         self.angles_in_sweep_frame[own] = np.tile(path.travels, own.size // len(once))
         self.pace[own] = 0.0
         self._ways[k] = path.travels, np.append(0.0, np.cumsum(np.hypot(*np.diff(once[:, :2], axis=0).T)))

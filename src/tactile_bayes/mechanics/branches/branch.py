@@ -55,7 +55,7 @@ MOST_CHANGES = 16  # largest number of phases of a branch that are recorded
 _MOST, _MOST_ON_LINE = 256, 2
 _LEAST_TRAVEL = 1e-12  # travel of a path that rounding may leave of none
 _TOUCHES, _GRAZES, _SLIPS_OFF = int(Reachability.TOUCHES), int(Reachability.GRAZES), int(Reachability.SLIPS_OFF)
-_NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
+_NEVER, _FOLD, _RELEASE = int(SnapOff.NEVER), int(SnapOff.FOLD), int(SnapOff.RELEASE)
 
 _ACROSS = 0.5 * math.pi
 
@@ -77,16 +77,17 @@ def branch_workspace(accuracy: Accuracy, order: int, samples: int, knots: int, l
 @compiled
 def follow_branch(
     scene: Scene, lines: Floats | None, samples: PathSamples, workspace: BranchWorkspace, found: PathResults
-) -> None:
+) -> bool:
     """Follow a branch from first contact to snap-off, and write its events and what is known of its samples.
 
-    The scene has the first line of a drive that carries the base.
+    The scene has the first line of a drive that carries the base. False if a contact that sticks seems to end in a
+    fold: it hardly yields, and errors of the travel may be larger than its growth.
     """
     work, event = workspace.leg, found.event
     start = beginning(scene, lines, work.accuracy.first_step)
     here, length, followed = _begin(start, found), FIRST_LENGTH, 0
     if event.reach != _TOUCHES:
-        return
+        return True
     may_release = lines is not None or not is_straight(scene.beam)
     setting = Setting(lines, workspace.knots, start.near.ends, may_release)
     for _ in range(workspace.legs.phase.size):
@@ -110,6 +111,7 @@ def follow_branch(
             break
         length = next_length(here, step, pace, work)
     _end(followed, here, lines, start, samples, workspace, found)
+    return event.snap_off != _FOLD or slides(here.scene.phase)
 
 
 @inlined

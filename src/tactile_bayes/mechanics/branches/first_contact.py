@@ -328,19 +328,24 @@ def _between(
 
 @compiled
 def _arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
-    """First contact of a rod that is carried along lines, the number of the line, and the travel."""
-    least, way = math.inf, 0.0
+    """First contact of a rod that is carried along lines, the number of the line, and the travel.
+
+    A first line that ends at no travel turns the rod into the pose in which the others begin, if it touches there.
+    """
+    least, way, first = math.inf, 0.0, int(lines[0, 7] == 0.0)
     for k in range(lines.shape[0]):
         if not math.isnan(lines[k, 7]):
             way = lines[k, 7]
-    for k in range(lines.shape[0]):
+    for k in range(first, lines.shape[0]):
         if math.isnan(lines[k, 0]):
             break
         line = line_of(lines, k)
-        found, travel = _arrival_on(outline, beam, line, way, k == 0)
+        found, travel = _arrival_on(outline, beam, line, way, k == first)
         if math.isfinite(travel) or _is_blocked(found):
             reach, distance, begin, tip_first, limits, gap = found
-            if k == 0 and travel == line.travel and not _is_blocked(found):
+            if k == first and travel == line.travel and not _is_blocked(found):
+                if first == 1 and gap > lines[0, 6]:
+                    return Approach(reach, distance, begin, tip_first, limits, 0.0), 0, gap
                 reach = _BEGINS_INSIDE
             return Approach(reach, distance, begin, tip_first, limits, gap), k, travel
         least = min(least, found.distance)

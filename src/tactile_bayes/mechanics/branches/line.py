@@ -78,6 +78,14 @@ def lines_through(poses: Floats, length: float, *, backward: bool = False, off: 
     return LinePath(lines, travels)
 
 
+def turned_in(path: LinePath) -> LinePath:
+    """Return a drive with a first line, up to no travel, that turns the rod into its first pose."""
+    before = path.lines[:1].copy()
+    before[0, 2] -= np.pi
+    before[0, 3:] = 0.0, 0.0, 1.0, -np.pi, 0.0
+    return LinePath(np.concatenate([before, path.lines]), path.travels)
+
+
 def _corners(points: Floats, off: float) -> Index:
     """Indices of the points between which a path is straight, by the method of Ramer, Douglas and Peucker.
 

@@ -59,6 +59,7 @@ _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)  # accuracy with event
 # Accuracy that noise requires, beside its tolerance.
 _FAST = _EXACT._replace(resolved=1e-3, sharp=1e-6, first_step=1e-6, last_step=1e-4, exact=False)
 _LAST_STEP_STUCK = 4e-16  # last step where a rod may stick: what hardly slips is lost by coarser ones
+_FINER = 1e-6  # resolution of paths that noise would require less of
 _EXACT_ORDER, _FAST_ORDER = 32, 12  # numbers of terms of the series of a leg
 _FEWEST = 16  # fewest sweeps that another thread shares
 
@@ -293,6 +294,7 @@ def _solve(
     line: Line | None,
     asks_clearance: bool,
     workspace: BranchWorkspace,
+    finer: BranchWorkspace,
     table: Floats,
     loads: Floats,
     all_states: Any,
@@ -302,7 +304,8 @@ def _solve(
     """Follow the path of every sweep, and write the results of its samples.
 
     Sweeps are a structured array with fields as in `Sweeps`; loads and the last three are as in `Solutions`, but
-    structured. Room is for the lines of one sweep, and `table` for that of one contour.
+    structured. Room is for the lines of one sweep, `table` for that of one contour, and the finer workspace for paths
+    that the other leaves in doubt.
     """
     count, knots, accuracy = shapes.knots.shape[1], workspace.knots, workspace.leg.accuracy
     for i in range(sweeps.size):
@@ -314,7 +317,9 @@ def _solve(
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = PathSamples(segments.angles[first:last], segments.rows[first:last], segments.relative)
         found = PathResults(loads[c], all_states[c], event_states[i], event)
-        follow_branch(scene, room, samples, workspace, found)
+        is_clear = follow_branch(scene, room, samples, workspace, found)
+        if not (is_clear or accuracy.exact):
+            follow_branch(scene, room, samples, finer, found)
         event.clear_angle = math.nan
         if asks_clearance and event.reach == _TOUCHES:
             event.clear_angle = _clear_angle(scene, room, event, accuracy)
@@ -361,6 +366,8 @@ def solve_sweeps(
     lines = 0 if segments.lines is None else segments.lines.shape[1]
 
     def solve(part: slice) -> None:
+        workspace = branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines)
+        finer = workspace.leg._replace(accuracy=accuracy._replace(resolved=_FINER))
         _solve(
             shapes,
             varied_of(None if profile is None else profile.shaped(np.zeros(MOST_MODES))),  # with arrays of its own
@@ -369,7 +376,8 @@ def solve_sweeps(
             segments,
             *_carried(segments.lines),
             asks_clearance,
-            branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines),
+            workspace,
+            workspace._replace(leg=finer),
             np.empty(shapes.tables.shape[1:]),
             loads,
             all_states,
