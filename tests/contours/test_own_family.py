@@ -110,7 +110,7 @@ WRONG = {
             lambda x, k: np.where(x < 0, k, 2 * k) * 2 * x,
             lambda x, k: np.where(x < 0, k, 2 * k) * 2,
         ),
-        r"g'' jumps at x ≈ 0: .*`knots`",
+        r"g'' jumps at x ≈ 0, from .*`knots`",
     ),
     "a flat bottom": (
         graph(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_numbers, check_array, refused, shown
-from tactile_bayes.contours.halves import Halves
+from tactile_bayes.contours.halves import Half, Halves
 from tactile_bayes.errors import ContourError
 from tactile_bayes.numerics.roots import bound_ends, falling_root
 
@@ -35,10 +35,12 @@ class Contour(ABC):
 
     A family is a frozen dataclass of its parameters, which are scalars or arrays that broadcast: one contour object may
     hold many contours. The contour's own parameter p is any variable of which point and slope angle are continuous
-    functions. A family defines the point at p (`locate`) and the ends (`domain`); everything else follows by root
-    search and is overridden where there is a formula. `check` verifies a new family.
+    functions. A family defines the point at p (`locate`) and its ends (`domain`), if it has any; all else follows by
+    root search and is overridden where there is a formula. `check` verifies a new family.
 
-    Methods raise ParameterError for arguments that are not numbers, or do not broadcast with the parameters.
+    Methods take arrays that broadcast with the parameters, and return arrays of the broadcast shape, NaN where the
+    contour has no such point; lengths are in the contour's unit, angles in rad. They raise ParameterError for arguments
+    that are not numbers, or do not broadcast with the parameters.
 
     Contours are equal if they are of one family and all their parameters are equal, including their shapes. A family
     that inherits this is a `dataclass(frozen=True, eq=False)`.
@@ -68,23 +70,12 @@ class Contour(ABC):
 
     @abstractmethod
     def locate(self, parameter: ArrayLike) -> Locus:
-        """Points at the contour's own parameter.
-
-        Parameters
-        ----------
-        parameter : array_like
-            Broadcasts with the parameters of the family.
-
-        Returns
-        -------
-        Locus
-            Arrays of the broadcast shape; lengths in the contour's unit of length, angles in rad.
-        """
+        """Points at the contour's own parameter."""
 
     @property
-    @abstractmethod
     def domain(self) -> tuple[Floats, Floats]:
         """Least and greatest parameter; the contour ends at a finite one, and is endless at an infinite one."""
+        return np.asarray(-np.inf), np.asarray(np.inf)
 
     def _at(self, name: str, values: ArrayLike) -> Floats:
         """Return the argument of a method as an array, or refuse one that does not broadcast with the parameters."""
@@ -108,50 +99,17 @@ class Contour(ABC):
         return "where it ends"
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        """Contour's own parameter at a slope angle.
-
-        Parameters
-        ----------
-        slope_angle : array_like
-            Slope angle α [rad]; broadcasts with the parameters of the family.
-
-        Returns
-        -------
-        ndarray
-            Of the broadcast shape; NaN where the contour has no such slope.
-        """
+        """Contour's own parameter at a slope angle α [rad]."""
         wanted = self._at("slope_angle", slope_angle)
         return self._parameter_where(wanted, lambda locus: (locus.slope_angle, locus.slope_rate))
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        """Contour's own parameter at a position.
-
-        Parameters
-        ----------
-        x : array_like
-            Position, in the contour's unit of length; broadcasts with the parameters of the family.
-
-        Returns
-        -------
-        ndarray
-            Of the broadcast shape; NaN beyond the ends.
-        """
+        """Contour's own parameter at a position x [length]."""
         wanted = self._at("x", x)
         return self._parameter_where(wanted, lambda locus: (locus.x, locus.arclength_rate * np.cos(locus.slope_angle)))
 
     def height(self, x: ArrayLike) -> Floats:
-        """Height of the contour at x.
-
-        Parameters
-        ----------
-        x : array_like
-            Position, in the contour's unit of length; broadcasts with the parameters of the family.
-
-        Returns
-        -------
-        ndarray
-            Heights in the same unit; NaN beyond the ends.
-        """
+        """Height of the contour at a position x [length]."""
         return self.locate(self.parameter_of_x(x)).y
 
     @property
@@ -177,9 +135,8 @@ class Contour(ABC):
         try:
             return self._each(lambda value: np.broadcast_to(value, (*shape, *np.shape(value)[len(self.shape) :])))
         except (TypeError, ValueError):
-            raise refused(
-                "shape", shape, f"give a shape to which that of the contours, {self.shape}, broadcasts"
-            ) from None
+            wanted = f"give a shape to which that of the contours, {self.shape}, broadcasts"
+            raise refused("shape", shape, wanted) from None
 
     def take(self, index: Index | tuple[Index, ...]) -> Self:
         """Contours at `index`, of a contour whose parameters are all arrays of one shape."""
@@ -196,34 +153,12 @@ class Contour(ABC):
         return other
 
     def point(self, slope_angle: ArrayLike) -> tuple[Floats, Floats]:
-        """Point at which the contour has a slope angle.
-
-        Parameters
-        ----------
-        slope_angle : array_like
-            Slope angle α in (−π/2, π/2) [rad]; broadcasts with the parameters of the family.
-
-        Returns
-        -------
-        x, y : ndarray
-            In the contour's unit of length; NaN where the contour has no such slope.
-        """
+        """Point (x, y) [length] at which the contour has a slope angle α in (−π/2, π/2) [rad]."""
         locus = self.locate(self.parameter_of_slope(slope_angle))
         return locus.x, locus.y
 
     def radius_of_curvature(self, slope_angle: ArrayLike) -> Floats:
-        """Radius of curvature ρ = dσ/dα at a slope angle.
-
-        Parameters
-        ----------
-        slope_angle : array_like
-            Slope angle α in (−π/2, π/2) [rad]; broadcasts with the parameters of the family.
-
-        Returns
-        -------
-        ndarray
-            In the contour's unit of length; infinite where the curvature vanishes, NaN where there is no such slope.
-        """
+        """Radius of curvature ρ = dσ/dα [length] at a slope angle α [rad]; infinite where the curvature vanishes."""
         locus = self.locate(self.parameter_of_slope(slope_angle))
         with np.errstate(divide="ignore"):
             return locus.arclength_rate / locus.slope_rate
@@ -256,6 +191,15 @@ class Vertexed(Contour):
 
     q: Parameter
     x_c: Parameter
+
+    @property
+    @abstractmethod
+    def half(self) -> Half:
+        """Either side of the vertex, for compiled code."""
+
+    @property
+    def halves(self) -> Halves:
+        return Halves(self.half, self.half, np.asarray(self.x_c), np.asarray(self.q))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -315,22 +259,7 @@ class Graph(Contour):
 
     @abstractmethod
     def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Values of g, g' and g''.
-
-        Parameters
-        ----------
-        x : ndarray
-            Positions between the ends [length]; they broadcast with the parameters of the family.
-
-        Returns
-        -------
-        (ndarray, ndarray, ndarray)
-            g(x) [length], g'(x), and g''(x) [1/length], of the broadcast shape.
-        """
-
-    @property
-    def domain(self) -> tuple[Floats, Floats]:
-        return np.asarray(-np.inf), np.asarray(np.inf)
+        """Values of g [length], g' and g'' [1/length] at positions x between the ends [length]."""
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         return self._own("x", x)
@@ -343,10 +272,10 @@ class Graph(Contour):
         return Locus(x, g, np.arctan(slope), np.sqrt(steepness), bend / steepness)
 
 
-def alike(*arrays: Floats) -> tuple[Floats, ...]:
-    """Broadcast arrays to one shape, with a short cut for equal shapes, since this is called in inner loops."""
-    shape = np.shape(arrays[0])
-    return arrays if all(np.shape(a) == shape for a in arrays) else np.broadcast_arrays(*arrays)
+def locus_of(*members: Floats) -> Locus:
+    """Broadcast the members of a locus to one shape, with a short cut for equal shapes, as inner loops call it."""
+    shape = np.shape(members[0])
+    return Locus(*(members if all(np.shape(m) == shape for m in members) else np.broadcast_arrays(*members)))
 
 
 def as_parameter(family: str, name: str, given: Any) -> Parameter:

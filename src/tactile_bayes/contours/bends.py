@@ -21,12 +21,9 @@ _NEIGHBOURS, _FEWEST_BANDED = 8, 20
 
 
 class Bends(NamedTuple):
-    """Parabolas fitted to stretches of neighbouring points; the last stretch contains all points.
-
-    The quadratic term is the scalar product of the heights with a parabola of signs + − + that is orthogonal to lines.
-    Heights of a convex contour, less the line through them at its sign changes, have the signs + − + too, so that their
-    product is never negative.
-    """
+    """Parabolas fitted to stretches of neighbouring points, the last of all points, by the product with a parabola of
+    signs + − + that is orthogonal to lines. Heights of a convex contour, less the line through them at its sign
+    changes, have the signs + − + too, so that their product is never negative."""
 
     first: Floats
     last: Floats
@@ -94,8 +91,8 @@ def refuse_two_bands(x: Floats, y: Floats) -> None:
     """Refuse points with two heights at about the same x, like those of a closed outline.
 
     The heights of eight neighbours are parted at their widest gap. On a convex contour the lower ones are neighbours
-    again. The points are refused if upper and lower ones alternate, with a gap twice as wide as either part, in more
-    than a third of all such groups; of groups that only scatter, one in 150 does so.
+    again. In more than a third of such groups upper and lower ones may not alternate, with a gap twice as wide as
+    either part; of groups that only scatter, one in 150 does so.
     """
     if x.size < _FEWEST_BANDED:
         return

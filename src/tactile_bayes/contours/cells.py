@@ -22,8 +22,7 @@ _MOST = 256
 def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:
     """Tables of contours with parameters of shape (n,), between two parameters, each of shape (n,).
 
-    Cells end at knots and are halved until series of 16 terms have errors below 4e-15 of the distance from the origin
-    in points, and below 4e-15 rad in slope angles.
+    Cells end at knots and are halved until series of 16 terms are exact to 4e-15, relative in points, in slope in rad.
     """
     count = low.size
     knots = np.array([np.broadcast_to(knot, (count,)) for knot in contour.knots], dtype=float).reshape(-1, count)
@@ -65,10 +64,7 @@ def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:
 
 
 def _series(contour: Contour, owner: Index, begin: Floats, end: Floats) -> Floats:
-    """Coefficients of x, y and slope angle, shape (cells, 3, order).
-
-    The series are fitted to differences from the values in the middle of the cell, to reduce rounding.
-    """
+    """Coefficients of x, y and slope angle, (cells, 3, order), fitted to differences from the middle of a cell."""
     parameter = begin[:, None] + (end - begin)[:, None] * chebyshev.nodes(_ORDER)
     locus = contour.take(np.broadcast_to(owner[:, None], parameter.shape)).locate(parameter)
     values = np.stack([locus.x, locus.y, locus.slope_angle], axis=1)

@@ -22,6 +22,7 @@ _STEEPEST = 1.5  # largest slope angle at which a contour is checked [rad]
 # Endless parameters are first sampled at the former times the hyperbolic sine of up to the latter, up to 4e17.
 _NEAREST, _ENDLESS = 1e-9, 62.0
 _STRAIGHT = 5  # number of neighbouring points without curvature that make a contour straight; rounding may cause fewer
+_HALVINGS = 60  # by which the place where a contour is too steep is found
 _SAME = 1e-9  # rounding error, as a share of a contour's size, or as an angle [rad]
 
 
@@ -60,19 +61,27 @@ def check(contour: Contour) -> None:
     if not isinstance(contour, Contour):
         raise ContourError(f"{contour!r} is no contour: give one, such as Parabola(0.5, 0.3)")
     try:
-        with np.errstate(all="ignore"):  # what is not finite is refused
-            _Checked(contour).run()
+        places = check_shape(contour)[::_FEW]
+        with np.errstate(all="ignore"):
+            _Checked(contour).refuse_picking(places)
+            _Checked(contour).refuse_searches(places)
     except ContourError:
         raise
     except (TypeError, ValueError, IndexError) as error:
         raise ContourError(f"{contour}: its formulas do not work on arrays of any shape: {error}") from error
 
 
+@np.errstate(all="ignore")  # what is not finite is refused
+def check_shape(contour: Contour) -> Floats:
+    """Refuse a contour that is not strictly convex, or has wrong rates; return the parameters at which it was tried."""
+    return _Checked(contour).refuse_shape()
+
+
 class _Checked:
     def __init__(self, contour: Contour) -> None:
         self.contour, self.shape = contour, contour.shape
 
-    def run(self) -> None:
+    def refuse_shape(self) -> Floats:
         lo, hi = self._window()
         places = lo + 0.5 * (hi - lo) * (1.0 + self._each(probes(_PROBES)))
         knots = [np.clip(np.broadcast_to(knot, self.shape), lo, hi)[None] for knot in self.contour.knots]
@@ -80,8 +89,7 @@ class _Checked:
         self._refuse_falling(self._finite(stops))
         self._refuse_rates(stops)
         self._refuse_straight(self._finite(places))
-        self._refuse_picking(places[::_FEW])
-        self._refuse_searches(places[::_FEW])
+        return places
 
     def _each(self, values: Floats) -> Floats:
         """Repeat values along the first axis for each contour."""
@@ -119,7 +127,7 @@ class _Checked:
         greatest = np.minimum(np.where(ends, np.inf, np.nanmax(angle, axis=0) - margin), _STEEPEST)
 
         def bisected(inside: Floats, outside: Floats, within: Callable[[Floats], Flags]) -> Floats:
-            for _ in range(60):
+            for _ in range(_HALVINGS if np.any(inside != outside) else 0):
                 middle = 0.5 * (inside + outside)
                 good = within(self._located(parameter(middle)[None]).slope_angle[0])
                 inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
@@ -181,23 +189,26 @@ class _Checked:
             found = mismatch(function, of, stops)
             if found is None:
                 continue
-            ends = np.array([found.left, found.right])
-            x = [_text(v) for v in self._located(self._each(ends)).x[_of(found.contour)]]
+            ends, one = self._each(np.array([found.left, found.right])), _of(found.contour)
+            x = [_text(v) for v in self._located(ends).x[one]]
+            wrong = f"is not the derivative of {whose}: from x = {x[0]} to {x[1]} they differ by {found.miss:.3g}"
             if np.isnan(found.miss):
-                raise self._refusal(found.contour, f"{name} jumps at x ≈ {x[1]}: name the parameter there in `knots`")
-            raise self._refusal(
-                found.contour,
-                f"{name} is not the derivative of {whose}: from x = {x[0]} to {x[1]} they differ by {found.miss:.3g}",
-            )
+                before, after = function(ends)[one]
+                wrong = (
+                    f"jumps at x ≈ {x[1]}, from {before:.3g} to {after:.3g}: name the parameter there in `knots`, or "
+                    f"join two contours there, Joined(left, right, x={x[1]})"
+                )
+            raise self._refusal(found.contour, f"{name} {wrong}")
 
     def _refuse_straight(self, locus: Locus) -> None:
         flat = (locus.slope_rate <= 0.0) & (locus.arclength_rate > 0.0)
         if np.any(straight := sliding_window_view(flat, _STRAIGHT, axis=0).all(axis=-1)):
             at, *index = _first(straight)
-            x = _text(locus.x[at, *index]), _text(locus.x[at + _STRAIGHT - 1, *index])
+            last = at + int(np.argmin(np.append(flat[at:, *index], False))) - 1
+            x = _text(locus.x[at, *index]), _text(locus.x[last, *index])
             raise self._refusal(tuple(index), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
 
-    def _refuse_searches(self, stops: Floats) -> None:
+    def refuse_searches(self, stops: Floats) -> None:
         contour, locus = self.contour, self._located(stops)
         size = np.abs(locus.x).max(axis=0) + np.abs(locus.y).max(axis=0)
         x = contour.locate(contour.parameter_of_x(locus.x)).x
@@ -216,7 +227,7 @@ class _Checked:
                     f"{_text(locus.x[at, *index])}, not {wanted[bad][0]:.6g}",
                 )
 
-    def _refuse_picking(self, stops: Floats) -> None:
+    def refuse_picking(self, stops: Floats) -> None:
         """Refuse contours for which `broadcast_to` and `take` give other points."""
         shape = self.shape or (1,)
         index = tuple(axis.ravel() for axis in np.indices(shape))

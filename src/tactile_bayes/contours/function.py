@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers
 from tactile_bayes.contours.base import Graph, Single
+from tactile_bayes.contours.checking import check_shape
 from tactile_bayes.contours.joined import SAME_SLOPE
-from tactile_bayes.contours.rates import mismatch, probes
+from tactile_bayes.contours.rates import probes
 from tactile_bayes.errors import ContourError, ParameterError
 
 Function = Callable[[Floats], ArrayLike]
@@ -23,10 +24,8 @@ _MAX_DEGREE = 1024
 # Largest size of the last coefficients of a resolved function, over the largest one and the root of the degree.
 _RESOLVED = 1e-14
 _REFOUND = 64.0  # largest error of an interpolant between its nodes, as a multiple of that size
-# Numbers of points, besides the ends, at which the derivatives and the interpolant of a function are checked.
-_PROBES, _MANY_PROBES = 400, 1000
+_PROBES = 1000  # number of points, besides the ends, at which a function and its interpolant are checked
 _PATCH = 32  # degree of the interpolants that locate a point where a function is not smooth
-_CONVEX = 1e-9  # negative second derivatives up to this share of the largest are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +72,6 @@ def from_function(
     slope, curvature : callable, optional
         g' and g'' [1/length], both or none.
 
-    Returns
-    -------
-    FunctionContour
-
     Raises
     ------
     ContourError
@@ -103,13 +98,17 @@ def from_function(
             raise ContourError(f"from_function: {what} is {function!r}: give a function of x")
     if (slope is None) != (curvature is None):
         raise ContourError("from_function: give both slope and curvature, or none of them")
+    checked = _NamedFunction(g, named)
+    x = _probes(lo, hi)
+    _refuse_dents(x, checked(x))
     if slope is None or curvature is None:
-        interpolant = _resolved(_NamedFunction(g, named), lo, hi)
+        interpolant = _resolved(checked, lo, hi)
         contour = FunctionContour(interpolant, interpolant.deriv(), interpolant.deriv(2), lo, hi, named)
     else:
+        for name, derivative in (("the slope", slope), ("the curvature", curvature)):
+            _NamedFunction(derivative, name)(x)
         contour = FunctionContour(g, slope, curvature, lo, hi, named)
-        _refuse_other_derivatives(contour)
-    _refuse_unless_convex(contour)
+    check_shape(contour)
     return contour
 
 
@@ -145,14 +144,11 @@ def _resolved(g: _NamedFunction, lo: float, hi: float) -> Chebyshev:
     interpolant = _interpolant(g, lo, hi)
     if interpolant is not None:
         return interpolant
-    x = _probes(lo, hi, _MANY_PROBES)
-    heights = g(x)
-    _refuse_dents(x, heights)
+    x = _probes(lo, hi)
     best = Chebyshev.interpolate(g, _MAX_DEGREE, domain=[lo, hi])
-    worst = x[np.argmax(np.abs(best(x) - heights))]
-    at = _rough_place(g, lo, hi, worst)
+    at = _rough_place(g, lo, hi, x[np.argmax(np.abs(best(x) - g(x)))])
     for share in (0.1, 0.01, 0.001):
-        near = _probes(max(lo, at - share * (hi - lo)), min(hi, at + share * (hi - lo)), _MANY_PROBES)
+        near = _probes(max(lo, at - share * (hi - lo)), min(hi, at + share * (hi - lo)))
         _refuse_dents(near, g(near))
     gap = 0.01 * (hi - lo)
     if all(_interpolant(g, *part) for part in ((lo, at - gap), (at + gap, hi)) if part[0] < part[1]):
@@ -167,7 +163,7 @@ def _resolved(g: _NamedFunction, lo: float, hi: float) -> Chebyshev:
 
 def _interpolant(g: _NamedFunction, lo: float, hi: float) -> Chebyshev | None:
     """Interpolant that equals g up to rounding, at its nodes and between them; None if there is none."""
-    between = _probes(lo, hi, _MANY_PROBES)
+    between = _probes(lo, hi)
     heights = g(between)
     degree = 16
     while degree <= _MAX_DEGREE:
@@ -176,7 +172,7 @@ def _interpolant(g: _NamedFunction, lo: float, hi: float) -> Chebyshev | None:
         small = _RESOLVED * np.sqrt(degree) * size.max()
         found = np.abs(interpolant(between) - heights).max() <= _REFOUND * small
         if found and np.all(size[-(degree // 8) :] <= small):
-            return interpolant.truncate(int(np.flatnonzero(size > small)[-1]) + 1)
+            return interpolant.trim(small)
         degree *= 2
     return None
 
@@ -214,27 +210,6 @@ def _probes(lo: float, hi: float, count: int = _PROBES) -> Floats:
     return 0.5 * (lo + hi) + 0.5 * (hi - lo) * probes(count)
 
 
-def _refuse_other_derivatives(contour: FunctionContour) -> None:
-    """Refuse derivatives whose integrals miss the function, or that jump."""
-    width = contour.right - contour.left
-    x = _probes(contour.left, contour.right)
-    g, slope = _NamedFunction(contour.g, "the function"), _NamedFunction(contour.slope, "the slope")
-    for rate, of in ((slope, g), (_NamedFunction(contour.curvature, "the curvature"), slope)):
-        found = mismatch(rate, of, x)
-        if found is not None and np.isnan(found.miss):
-            at = float(np.round(found.right / width, 12) * width) + 0.0
-            before, after = rate(np.array([found.left, found.right]))
-            raise ContourError(
-                f"from_function: {rate.name} given jumps at x ≈ {at:.6g}, from {before:.3g} to {after:.3g}: the "
-                f"contour is not smooth there; join two functions there, Joined(left, right, x={at:.6g})"
-            )
-        if found is not None:
-            raise ContourError(
-                f"from_function: {rate.name} given is not the derivative of {of.name}: from x = "
-                f"{found.left:.6g} to {found.right:.6g} they differ by {found.miss:.3g}"
-            )
-
-
 def _refuse_dents(x: Floats, heights: Floats) -> None:
     """Refuse heights if some lie above the chord of their neighbours."""
     share = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
@@ -244,23 +219,4 @@ def _refuse_dents(x: Floats, heights: Floats) -> None:
         raise ContourError(
             f"from_function: g is not strictly convex: it bends downward from x = {x[dented[0]]:.6g} to "
             f"{x[dented[-1] + 2]:.6g}; the contour is the lower boundary of the object, so leave that stretch out"
-        )
-
-
-def _refuse_unless_convex(contour: FunctionContour) -> None:
-    x = _probes(contour.left, contour.right)
-    bend = _NamedFunction(contour.curvature, "the curvature")(x)
-    concave = bend < -_CONVEX * np.abs(bend).max()
-    straight = (bend[1:] <= 0.0) & (bend[:-1] <= 0.0)
-    if np.any(concave):
-        at = np.flatnonzero(concave)
-        stretch = f"from x = {x[at[0]]:.6g} to {x[at[-1]]:.6g}"
-        raise ContourError(
-            f"from_function: g is not strictly convex: its second derivative is negative {stretch} (least "
-            f"{bend.min():.3g}); the contour is the lower boundary of the object, so leave that stretch out"
-        )
-    if np.any(straight):
-        at = np.flatnonzero(straight)
-        raise ContourError(
-            f"from_function: g is not strictly convex: it is straight from x = {x[at[0]]:.6g} to {x[at[-1] + 1]:.6g}"
         )

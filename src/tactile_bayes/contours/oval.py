@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike
-from tactile_bayes.contours.halves import OVAL, Half, Halves
+from tactile_bayes.contours.base import Locus, Parameter, Vertexed, locus_of
+from tactile_bayes.contours.halves import OVAL, Half
 
 
 class _Oval(Vertexed):
@@ -28,9 +28,8 @@ class _Oval(Vertexed):
         return -upright, upright
 
     @property
-    def halves(self) -> Halves:
-        half = Half(OVAL, *(np.asarray(axis) for axis in self.half_axes))
-        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
+    def half(self) -> Half:
+        return Half(OVAL, *(np.asarray(axis) for axis in self.half_axes))
 
     def end_name(self, side: Literal["left", "right"]) -> str:
         return "where it is vertical"
@@ -55,10 +54,8 @@ class Circle(_Oval):
     ----------
     r : array_like
         Radius, > 0 [length].
-    q : array_like
-        Height of the lowest point [length].
-    x_c : array_like
-        Position of the lowest point [length].
+    q, x_c : array_like
+        Height and position of the lowest point [length].
 
     Raises
     ------
@@ -86,8 +83,7 @@ class Circle(_Oval):
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = self._at("parameter", parameter)
         x, y = self.x_c + self.r * np.sin(alpha), self.q + 2.0 * self.r * np.sin(0.5 * alpha) ** 2
-        x, y, alpha, radius = alike(x, y, alpha, self.r + 0.0 * alpha)
-        return Locus(x, y, alpha, radius, np.ones_like(alpha))
+        return locus_of(x, y, alpha, self.r + 0.0 * alpha, np.ones(alpha.shape))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         return self._own("slope_angle", slope_angle)
@@ -99,14 +95,10 @@ class Ellipse(_Oval):
 
     Parameters
     ----------
-    a : array_like
-        Horizontal half-axis, > 0 [length].
-    b : array_like
-        Vertical half-axis, > 0 [length].
-    q : array_like
-        Height of the lowest point [length].
-    x_c : array_like
-        Position of the lowest point [length].
+    a, b : array_like
+        Horizontal and vertical half-axis, > 0 [length].
+    q, x_c : array_like
+        Height and position of the lowest point [length].
 
     Raises
     ------
@@ -137,14 +129,8 @@ class Ellipse(_Oval):
         a, b = self.a, self.b
         sin, cos = np.sin(t), np.cos(t)
         speed2 = (a * cos) ** 2 + (b * sin) ** 2
-        x, y, slope, speed, bend = alike(
-            self.x_c + a * sin,
-            self.q + 2.0 * b * np.sin(0.5 * t) ** 2,
-            np.arctan2(b * sin, a * cos),
-            np.sqrt(speed2),
-            a * b / speed2,
-        )
-        return Locus(x, y, slope, speed, bend)
+        x, y = self.x_c + a * sin, self.q + 2.0 * b * np.sin(0.5 * t) ** 2
+        return locus_of(x, y, np.arctan2(b * sin, a * cos), np.sqrt(speed2), a * b / speed2)
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = self._at("slope_angle", slope_angle)

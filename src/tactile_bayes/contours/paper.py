@@ -1,4 +1,4 @@
-"""The four profiles of Merker et al. 2018, doi 10.1155/2018/1613945, equations 21 to 24."""
+"""The four profiles of the paper."""
 
 from __future__ import annotations
 
@@ -13,22 +13,14 @@ from tactile_bayes.errors import ContourError
 
 
 def paper_profile(name: Literal["I", "II", "III", "IV"], q: float) -> Contour:
-    """Return one of the paper's profiles.
-
-    I is 0.7 x² + q, II is 0.5 x² + q, III is 1 − √(1 − x²) + q, and IV is 0.5 x² + q for x < 0 and x⁴ + q for x ≥ 0:
-    equations 21 to 24 of Merker et al. 2018, doi 10.1155/2018/1613945.
+    """Return one of the paper's profiles (equations 21 to 24 of Merker et al. 2018, doi 10.1155/2018/1613945).
 
     Parameters
     ----------
     name : {"I", "II", "III", "IV"}
-        Name of the profile.
+        0.7 x² + q, 0.5 x² + q, 1 − √(1 − x²) + q, or 0.5 x² + q for x < 0 and x⁴ + q for x ≥ 0, in rod lengths.
     q : float
         Height of the vertex above the x axis, in rod lengths.
-
-    Returns
-    -------
-    Contour
-        A single contour, in rod lengths.
 
     Raises
     ------

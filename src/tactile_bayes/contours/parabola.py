@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike
-from tactile_bayes.contours.halves import PARABOLA, Half, Halves
+from tactile_bayes.contours.base import Locus, Parameter, Vertexed, locus_of
+from tactile_bayes.contours.halves import PARABOLA, Half
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +21,8 @@ class Parabola(Vertexed):
     ----------
     a : array_like
         Half the curvature at the vertex, > 0 [1/length].
-    q : array_like
-        Height of the vertex [length].
-    x_c : array_like
-        Position of the vertex [length].
+    q, x_c : array_like
+        Height and position of the vertex [length].
 
     Raises
     ------
@@ -52,9 +50,8 @@ class Parabola(Vertexed):
         return -steepest, steepest
 
     @property
-    def halves(self) -> Halves:
-        half = Half(PARABOLA, np.asarray(self.a), np.ones(()))
-        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
+    def half(self) -> Half:
+        return Half(PARABOLA, np.asarray(self.a), np.ones(()))
 
     @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
@@ -62,7 +59,7 @@ class Parabola(Vertexed):
         t = np.tan(alpha)
         offset, square = t / (2.0 * self.a), 1.0 + t * t
         x, y, radius = self.x_c + offset, self.q + 0.5 * t * offset, square * np.sqrt(square) / (2.0 * self.a)
-        return Locus(*alike(x, y, alpha, radius, np.ones(alpha.shape)))
+        return locus_of(x, y, alpha, radius, np.ones(alpha.shape))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         return self._own("slope_angle", slope_angle)

@@ -99,7 +99,7 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     Returns
     -------
     MeasuredContour
-        The contour on [min x, max x], with `scatter` and `residual_rms`.
+        The contour on [min x, max x].
 
     Raises
     ------

@@ -21,7 +21,7 @@ _BEYOND = 1e-9  # share of a segment by which a foot beyond it may be rounding
 class Polyline:
     """A contour of straight segments between points, in one piece or several, as of a probe or a drawing.
 
-    It is what an inferred contour is compared with. Unlike other contours it cannot be swept along; see `from_points`.
+    An inferred contour is compared with it. Unlike other contours it cannot be swept along; see `from_points`.
 
     Parameters
     ----------

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike, as_parameter, common_shape, refuse_unless
-from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
+from tactile_bayes.contours.base import Locus, Parameter, Vertexed, as_parameter, common_shape, locus_of, refuse_unless
+from tactile_bayes.contours.halves import POWER_LAW, Half
 
 _LEAST_EXPONENT, _GREATEST_EXPONENT = 1.1, 50.0
 
@@ -57,34 +57,16 @@ class PowerLaw(Vertexed):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        refuse_unless(
-            np.greater_equal(self.n, _LEAST_EXPONENT),
-            "PowerLaw",
-            f"n must be at least {_LEAST_EXPONENT}: below, the vertex is as good as an edge, which Joined can give",
-            n=self.n,
-        )
-        refuse_unless(
-            np.less_equal(self.n, _GREATEST_EXPONENT),
-            "PowerLaw",
-            f"n must be at most {_GREATEST_EXPONENT:g}: above, the bottom is as good as straight",
-            n=self.n,
-        )
+        least = f"n must be at least {_LEAST_EXPONENT}: below, the vertex is as good as an edge, which Joined can give"
+        refuse_unless(np.greater_equal(self.n, _LEAST_EXPONENT), "PowerLaw", least, n=self.n)
+        most = f"n must be at most {_GREATEST_EXPONENT:g}: above, the bottom is as good as straight"
+        refuse_unless(np.less_equal(self.n, _GREATEST_EXPONENT), "PowerLaw", most, n=self.n)
 
     @classmethod
     def of_width(cls, w: Parameter, n: Parameter, q: Parameter, x_c: Parameter = 0.0) -> Self:
         """Power law (y − q)/w = (|x − x_c|/w)ⁿ, which is as high above its vertex as it is wide at w.
 
-        Parameters
-        ----------
-        w : array_like
-            Width, > 0 [length]; broadcasts with the others.
-        n, q, x_c : array_like
-            As in `PowerLaw`.
-
-        Raises
-        ------
-        ContourError
-            As in `PowerLaw`, and if w is not positive and finite.
+        Arguments and errors are those of `PowerLaw`, with a width w > 0 [length].
 
         Examples
         --------
@@ -104,13 +86,8 @@ class PowerLaw(Vertexed):
         return np.asarray(np.asarray(self.a) ** (1.0 / (1.0 - np.asarray(self.n))))
 
     @property
-    def domain(self) -> tuple[Floats, Floats]:
-        return np.asarray(-np.inf), np.asarray(np.inf)
-
-    @property
-    def halves(self) -> Halves:
-        half = Half(POWER_LAW, np.asarray(self.a), np.asarray(self.n))
-        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
+    def half(self) -> Half:
+        return Half(POWER_LAW, np.asarray(self.a), np.asarray(self.n))
 
     @property
     def knots(self) -> tuple[Floats, ...]:
@@ -130,14 +107,8 @@ class PowerLaw(Vertexed):
         steep = size ** (of_slope - 1.0)
         slope = a * n * steep * p
         steepness = 1.0 + slope * slope
-        x, y, alpha, speed, bend = alike(
-            self.x_c + flat * p,
-            self.q + a * size**of_height,
-            np.arctan(slope),
-            of_offset * flat * np.sqrt(steepness),
-            a * n * of_slope * steep / steepness,
-        )
-        return Locus(x, y, alpha, speed, bend)
+        speed, bend = of_offset * flat * np.sqrt(steepness), a * n * of_slope * steep / steepness
+        return locus_of(self.x_c + flat * p, self.q + a * size**of_height, np.arctan(slope), speed, bend)
 
     @np.errstate(over="ignore", invalid="ignore")
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:

@@ -42,11 +42,9 @@ def probes(count: int) -> Floats:
 
 
 def mismatch(rate: Rate, of: Rate, stops: Floats) -> Mismatch | None:
-    """Find the worst stretch between stops over which the change of a function differs from the integral of its rate.
+    """Find the worst stretch between stops, (n, ...), over which a function's change is not the integral of its rate.
 
     A rate may jump at stops only; a jump elsewhere is returned if there is nothing worse.
-
-    Shapes: stops (n, ...).
     """
     change, miss = _misses(rate, of, stops)
     excess = miss - _MISS * np.abs(change).max(axis=0) - _ROUNDING * np.abs(of(stops)).max(axis=0)
