@@ -72,26 +72,20 @@ class Joined(Contour):
         (before, left), (after, right) = ends
         scale = 1.0 + np.abs(left.x) + np.abs(left.y)
         meet = (np.abs(left.x - right.x) <= 1e-12 * scale) & (np.abs(left.y - right.y) <= 1e-12 * scale)
-        refuse_unless(
-            meet,
-            "Joined",
-            "the halves must meet at the joint: give both the same vertex, or an x where they cross",
-            **{"left x": left.x, "left y": left.y, "right x": right.x, "right y": right.y},
-        )
+        points = {"left x": left.x, "left y": left.y, "right x": right.x, "right y": right.y}
+        rule = "the halves must meet at the joint: give both the same vertex, or an x where they cross"
+        refuse_unless(meet, "Joined", rule, **points)
         edge = right.slope_angle - left.slope_angle
-        refuse_unless(
-            edge >= -SAME_SLOPE,
-            "Joined",
-            "the slope must not fall at the joint, else the object has a dent there",
-            **{"left slope": np.tan(left.slope_angle), "right slope": np.tan(right.slope_angle)},
-        )
+        slopes = {"left slope": np.tan(left.slope_angle), "right slope": np.tan(right.slope_angle)}
+        rule = "the slope must not fall at the joint, else the object has a dent there"
+        refuse_unless(edge >= -SAME_SLOPE, "Joined", rule, **slopes)
         joint = np.broadcast_arrays(before, after, np.where(edge > SAME_SLOPE, edge, 0.0), np.empty(shape))
-        self.__dict__.update(zip(("_before", "_after", "_edge"), joint, strict=False))
+        self.__dict__["_parameters"] = tuple(joint[:3])
 
     @property
     def _joint(self) -> tuple[Floats, Floats, Floats]:
         """Parameters of the left and the right half at the joint, and the turn between them [rad]."""
-        return self.__dict__["_before"], self.__dict__["_after"], self.__dict__["_edge"]
+        return self.__dict__["_parameters"]
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
@@ -160,10 +154,6 @@ class Joined(Contour):
 
     def _both(self, of_half: Callable[[Contour], Contour], of_value: Callable[[Floats], Floats]) -> Joined:
         other = object.__new__(type(self))  # the halves have been checked, and this is called in inner loops
-        other.__dict__.update(
-            left=of_half(self.left),
-            right=of_half(self.right),
-            x=self.x if self.x is None else of_value(np.asarray(self.x)),
-        )
-        other.__dict__.update((name, of_value(self.__dict__[name])) for name in ("_before", "_after", "_edge"))
+        x, joint = None if self.x is None else of_value(np.asarray(self.x)), tuple(map(of_value, self._joint))
+        other.__dict__.update(left=of_half(self.left), right=of_half(self.right), x=x, _parameters=joint)
         return other

@@ -52,7 +52,6 @@ class MeasuredContour(Graph, Single):
         check_kind("graph", self.graph, PPoly, "give a PPoly of SciPy, or take from_points")
         for name in ("x", "y", "scatter", "residual_rms"):
             check_numbers(name, getattr(self, name))
-        self.__dict__["_derivatives"] = self.graph, self.graph.derivative(), self.graph.derivative(2)
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
@@ -62,7 +61,7 @@ class MeasuredContour(Graph, Single):
         return "the first point measured" if side == "left" else "the last point measured"
 
     def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        g, slope, bend = (np.asarray(f(x)) for f in self.__dict__["_derivatives"])
+        g, slope, bend = (np.asarray(self.graph(x, order)) for order in range(3))
         return g, slope, bend
 
     def __repr__(self) -> str:
