@@ -40,6 +40,9 @@ def test_the_simpler_of_two_shapes_that_fit_is_more_probable(compared):
     assert len(compared.attrs["data_sha256"]) == 64
     assert compared.attrs["verdict"].startswith("circle with probability 0.")
     assert abs(float(compared.elpd_difference.min())) < 5.0
+    apart = np.diff(compared.log_density.dropna("sample").values, axis=0)[0]
+    assert np.abs(compared.elpd_difference).max() == pytest.approx(abs(apart.sum()))
+    assert compared.elpd_difference_error.max() == pytest.approx(np.sqrt(apart.size) * apart.std(ddof=1))
     assert compared.weight.sum() == pytest.approx(1.0)
     assert (compared.log_evidence_error < 0.2).all()
     wide = compared.probability_by_width  # of a prior: worse for more parameters

@@ -14,12 +14,7 @@ from scipy import stats
 
 from helpers.load_cells import CELL, SHARED, WALK, WANDER, moments
 from helpers.refusals import refused
-from tactile_bayes.comparison.leave_one_out import (
-    difference,
-    left_out,
-    left_out_from_wider,
-    stacking_weights,
-)
+from tactile_bayes.comparison.leave_one_out import left_out, left_out_from_wider, stacking_weights
 from tactile_bayes.errors import ParameterError
 
 SIGMAS = 5.0
@@ -232,18 +227,6 @@ def test_one_draw_does_not_pass_for_many():
 
 
 # --- Models beside each other -----------------------------------------------------------------------------------
-
-
-def test_a_difference_has_the_scatter_of_the_samples():
-    one, other = np.random.default_rng(16).normal(size=(2, 50))
-    found = difference(one, other)
-    assert found.difference == pytest.approx(one.sum() - other.sum())
-    assert found.standard_error == pytest.approx(np.sqrt(50) * np.std(one - other, ddof=1))
-    assert difference(other, one) == pytest.approx((-found.difference, found.standard_error))
-
-
-def score(weights, logs):
-    return np.log(np.asarray(weights) @ np.exp(logs)).sum(axis=-1)
 
 
 def test_stacking_is_the_best_point_of_a_grid():

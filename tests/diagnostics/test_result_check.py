@@ -21,8 +21,7 @@ from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import Motion, Rotation, scan
-from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.normal_band import normal_band
+from tactile_bayes.uncertainty.band import contour_band, normal_band
 
 
 def changed(tree, group, **values):

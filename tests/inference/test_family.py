@@ -27,10 +27,9 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import to_si
 from tactile_bayes.report import write_report
 from tactile_bayes.rig import Rig
-from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.band import contour_band, normal_band
 from tactile_bayes.uncertainty.gap import gap
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
-from tactile_bayes.uncertainty.normal_band import normal_band
 from tactile_bayes.uncertainty.summary import summary
 
 CENTRED = Family("parabola", x_c=0.0)

@@ -9,8 +9,7 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.normal_band import normal_band
+from tactile_bayes.uncertainty.band import contour_band, normal_band
 from tactile_bayes.uncertainty.offsets import Feet, aligned, normal_offsets
 
 X = np.linspace(-0.4, 0.4, 33)

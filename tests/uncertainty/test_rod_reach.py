@@ -7,8 +7,7 @@ from tactile_bayes.contours import paper_profile
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
-from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.normal_band import normal_band
+from tactile_bayes.uncertainty.band import contour_band, normal_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach, reach_attributes
 
 

@@ -14,8 +14,8 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_probability, check_switch, refused
-from tactile_bayes.comparison.leave_one_out import difference, stacking_weights
-from tactile_bayes.comparison.left_out import PredictedSamples, predicted_samples
+from tactile_bayes.comparison.leave_one_out import LeftOut, stacking_weights
+from tactile_bayes.comparison.left_out import predicted_samples
 from tactile_bayes.comparison.verdict import verdict_on
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
@@ -47,7 +47,6 @@ GIVEN_UP = 100.0
 # family's probability is zero.
 _HOPELESS = 20.0
 
-
 _KEPT_DRAWS = 2000  # largest number of draws of a contour that are kept of each family
 _BY_DRAW = ("family", "contour_draw", "contour_parameter")
 
@@ -58,7 +57,7 @@ class _Tried(NamedTuple):
     ceiling: float  # largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed
     draws: Draws | None = None
     evidence: ContourEvidence | None = None  # None also where it cannot be computed from the draws
-    predicted: PredictedSamples | None = None
+    predicted: LeftOut | None = None
     p_value: float = np.nan
     passed: bool = False
 
@@ -252,45 +251,39 @@ def with_known(family: Family, points: Floats) -> Floats:
 
 def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Dataset:
     """Return the comparison of families; `asked` are further attributes."""
-    evidences = np.full((len(tried), len(WIDTHS)), np.nan)
-    errors = np.full(len(tried), np.nan)
-    for i, one in enumerate(tried.values()):
-        if one.evidence is not None:
-            evidences[i], errors[i] = one.evidence.log_evidence, one.evidence.standard_error
-    ceilings = np.array([one.ceiling for one in tried.values()])
+    found = list(tried.values())
+    evidences = np.array([one.evidence.log_evidence if one.evidence else [np.nan] * len(WIDTHS) for one in found])
+    errors = np.array([one.evidence.standard_error if one.evidence else np.nan for one in found])
+    ceilings = np.array([one.ceiling for one in found])
     hopeless = np.isnan(errors) & (ceilings < np.nanmax(np.append(evidences, -np.inf)) - _HOPELESS)
     counted = np.where(hopeless[:, None], -np.inf, evidences)
     complete = not np.isnan(counted).any()
     by_width = np.exp(counted - logsumexp(counted, axis=0)) if complete else np.full(evidences.shape, np.nan)
-    variables = {
-        "probability": ("family", by_width[:, _USUAL]),
-        "log_evidence": ("family", evidences[:, _USUAL]),
-        "log_evidence_error": ("family", errors),
-        "log_likelihood": ("family", ceilings),
-        "probability_by_width": (("prior_width", "family"), by_width.T),
-        "p_value": ("family", [one.p_value for one in tried.values()]),
-        "fits": ("family", [one.passed for one in tried.values()]),
-        **_runs([one.draws for one in tried.values()]),
+    of_families = {
+        "probability": by_width[:, _USUAL],
+        "log_evidence": evidences[:, _USUAL],
+        "log_evidence_error": errors,
+        "log_likelihood": ceilings,
+        "p_value": [one.p_value for one in found],
+        "fits": [one.passed for one in found],
+        "sampled": [one.draws is not None for one in found],
+        "converged": [one.draws is not None and one.draws.converged for one in found],
+        "steps": [one.draws.steps_run if one.draws else 0 for one in found],
+        "seconds": [one.draws.seconds if one.draws else 0.0 for one in found],
     }
-    predicted = [one.predicted for one in tried.values()]
-    if any(of_family is not None for of_family in predicted):
-        variables |= _left_out(predicted)
-    result = xr.Dataset(variables, coords={"family": list(tried), "prior_width": list(WIDTHS)}, attrs=asked)
+    result = xr.Dataset(
+        {name: ("family", values) for name, values in of_families.items()}
+        | {"probability_by_width": (("prior_width", "family"), by_width.T)}
+        | _left_out([one.predicted for one in found]),
+        coords={"family": list(tried), "prior_width": list(WIDTHS)},
+        attrs=asked,
+    )
     result.attrs["none_fits"] = int(np.isfinite(result.p_value.values).any() and not result.fits.any())
     result.attrs |= {
         "verdict": verdict_on(result),
         "most_probable": str(result.family.values[np.argmax(result.probability.values)]) if complete else "",
     }
     return result
-
-
-def _runs(runs: Sequence[Draws | None]) -> dict[str, Any]:
-    """Return whether and how families were sampled."""
-    made = [
-        (False, False, 0, 0.0) if run is None else (True, run.converged, run.steps_run, run.seconds) for run in runs
-    ]
-    names = ("sampled", "converged", "steps", "seconds")
-    return {name: ("family", list(values)) for name, values in zip(names, zip(*made, strict=True), strict=True)}
 
 
 def _contour_draws(drawn: Sequence[tuple[Family, Draws | None]]) -> Floats:
@@ -306,29 +299,30 @@ def _contour_draws(drawn: Sequence[tuple[Family, Draws | None]]) -> Floats:
     return found
 
 
-def _left_out(predicted: Sequence[PredictedSamples | None]) -> dict[str, Any]:
-    """Return the leave-one-out variables; NaN, with weight 0, for families that were not sampled."""
-    known = [of_family for of_family in predicted if of_family is not None]
+def _left_out(predicted: Sequence[LeftOut | None]) -> dict[str, Any]:
+    """Return the leave-one-out variables, if there are any; NaN, with weight 0, for families that were not sampled."""
+    known = [np.array(of_family) for of_family in predicted if of_family is not None]
+    if not known:
+        return {}
     sampled = np.array([of_family is not None for of_family in predicted])
-    logs = np.array([of_family.log_density for of_family in known])
-    common = np.isfinite(logs).all(axis=0)
+    every = np.full((3, len(predicted), known[0].shape[1]), np.nan)
+    every[:, sampled] = np.stack(known, axis=1)
+    logs, errors, tails = every
+    common = np.isfinite(logs[sampled]).all(axis=0)
     if np.count_nonzero(common) < 2:
         raise ParameterError("fewer than two samples are possible under all families: they cannot be compared")
-    elpd = logs[:, common].sum(axis=1)
-    apart = [difference(of_family, logs[np.argmax(elpd), common]) for of_family in logs[:, common]]
-    columns = {
+    elpd, weight = logs[:, common].sum(axis=1), np.zeros(len(predicted))
+    weight[sampled] = stacking_weights(logs[np.ix_(sampled, common)])
+    # Equation 24 of Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4.
+    behind = logs[:, common] - logs[np.nanargmax(elpd), common]
+    of_families = {
         "elpd": elpd,
-        "elpd_error": [np.sqrt(np.sum(of_family.standard_error[common] ** 2)) for of_family in known],
-        "elpd_difference": [one.difference for one in apart],
-        "elpd_difference_error": [one.standard_error for one in apart],
-        "weight": stacking_weights(logs[:, common]),
-        "largest_k": [np.nanmax(of_family.pareto_k) for of_family in known],
+        "elpd_error": np.sqrt(np.sum(errors[:, common] ** 2, axis=1)),
+        "elpd_difference": behind.sum(axis=1),
+        "elpd_difference_error": np.sqrt(behind.shape[1]) * behind.std(axis=1, ddof=1),
+        "weight": weight,
+        "largest_k": np.fmax.reduce(tails, axis=1),
     }
-    every = np.full((len(predicted), logs.shape[1]), np.nan)
-    every[sampled] = logs
-    out: dict[str, Any] = {"log_density": (("family", "sample"), every)}
-    for name, values in columns.items():
-        of_all = np.full(len(predicted), 0.0 if name == "weight" else np.nan)
-        of_all[sampled] = values
-        out[name] = ("family", of_all)
-    return out
+    return {name: ("family", values) for name, values in of_families.items()} | {
+        "log_density": (("family", "sample"), logs)
+    }

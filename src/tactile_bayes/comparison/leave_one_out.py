@@ -46,14 +46,6 @@ class FromWider(NamedTuple):
     effective: float  # effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation reduces it further
 
 
-class Difference(NamedTuple):
-    """Difference of two models' leave-one-out log-densities."""
-
-    # Sum over samples of the first model's log-densities less the second's; positive if the first predicts better.
-    difference: float
-    standard_error: float  # standard error from the scatter between samples: √n standard deviations
-
-
 def largest_k(draws: int) -> float:
     """Return the Pareto k̂ above which so many draws do not represent the posterior without a sample.
 
@@ -104,16 +96,6 @@ def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
     effective = float(effective_number(np.exp(log_weights.ravel())))
     found, error = _weighed(log_weights, log_density)
     return FromWider(found, error if effective >= _LEAST_EFFECTIVE else math.inf, effective)
-
-
-def difference(one: Floats, other: Floats) -> Difference:
-    """Return the difference of two models' leave-one-out log-densities, (samples,), and its standard error.
-
-    Equation 24 of Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4; below 4 or so a difference says little,
-    and its standard error is too small (Sivula et al. 2020, arXiv 2008.10296).
-    """
-    by_sample = one - other
-    return Difference(float(by_sample.sum()), float(math.sqrt(by_sample.size) * by_sample.std(ddof=1)))
 
 
 def stacking_weights(log_densities: Floats) -> Floats:

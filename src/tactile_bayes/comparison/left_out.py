@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.comparison.leave_one_out import left_out, left_out_from_wider
+from tactile_bayes.comparison.leave_one_out import LeftOut, left_out, left_out_from_wider
 from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
@@ -18,22 +16,12 @@ from tactile_bayes.numerics.random_numbers import Seed, spawn
 _DRAWS = 2000  # largest number of draws under which densities are computed
 
 
-class PredictedSamples(NamedTuple):
-    """Leave-one-out log-density of each sample, its channels together, in units of EI/L and EI/L²."""
-
-    # Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias, or beside a discrepancy.
-    log_density: Floats
-    standard_error: Floats  # Monte-Carlo error; infinite where it cannot be trusted
-    pareto_k: Floats  # NaN where the contour was inferred again without the sample
-
-
-def predicted_samples(
-    problem: ContourProblem, sampled: Sampled, *, seed: Seed, settings: SamplerSettings
-) -> PredictedSamples:
-    """Return the leave-one-out predictive densities of a record.
+def predicted_samples(problem: ContourProblem, sampled: Sampled, *, seed: Seed, settings: SamplerSettings) -> LeftOut:
+    """Return the leave-one-out densities of a record, of a sample's channels together in units of EI/L and EI/L².
 
     Next to first contact and snap-off the posterior has none of the contours that the record without a sample allows:
-    these samples are predicted from a posterior without any of them.
+    these samples are predicted from a posterior without any of them, and have no k̂. If the load cell drifts or has an
+    unknown bias, or beside a discrepancy, they are NaN.
     """
     model = problem.model
     logs = _densities(model, sampled.draws)
@@ -44,7 +32,7 @@ def predicted_samples(
     k[chosen] = np.nan
     if _is_correlated(model):
         log_density[chosen] = error[chosen] = np.nan
-        return PredictedSamples(log_density, error, k)
+        return LeftOut(log_density, error, k)
     seeds = spawn(seed, 2)
     without = np.zeros(logs.shape[-1], dtype=bool)
     without[chosen] = True
@@ -63,7 +51,7 @@ def predicted_samples(
     for i, of_sample in enumerate(chosen):
         one = left_out_from_wider(of_events, i)
         log_density[of_sample], error[of_sample] = one.log_density, one.standard_error
-    return PredictedSamples(log_density, error, k)
+    return LeftOut(log_density, error, k)
 
 
 def _is_correlated(model: ContourModel) -> bool:

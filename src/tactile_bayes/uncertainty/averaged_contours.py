@@ -8,6 +8,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.uncertainty.offsets import heights_of
 
 
 def family_weights(comparison: xr.Dataset) -> tuple[Floats, str]:
@@ -35,10 +36,7 @@ def averaged_heights(comparison: xr.Dataset, x: Floats, most: int) -> Floats:
         family = family_named(str(name))
         draws = comparison["contour_draws"].sel(family=name).values[:, : len(family.parameters)]
         picked = np.floor((np.arange(count) + 0.5) * len(draws) / count).astype(np.intp)
-        contours = family.build(*draws[picked].T)
-        with np.errstate(over="ignore"):  # far out, where no contour is
-            of_family = contours.take(np.arange(count)[:, None]).height(x)
-        heights.append(np.broadcast_to(of_family, (count, x.size)))
+        heights.append(heights_of(family.build(*draws[picked].T), x))
     return np.concatenate(heights)
 
 

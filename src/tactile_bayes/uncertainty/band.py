@@ -1,4 +1,4 @@
-"""Uncertainty bands of contours."""
+"""Uncertainty bands of contours, in height or across a contour along its normals."""
 
 from __future__ import annotations
 
@@ -11,21 +11,18 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_numbers, refused
-from tactile_bayes.contours import Contour
+from tactile_bayes.contours.base import Contour, check_single
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws
-from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import COLUMNS
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family_weights
-from tactile_bayes.uncertainty.offsets import Moves, aligned, feet_of, most_central, normal_offsets
+from tactile_bayes.uncertainty.offsets import Moves, aligned, feet_of, heights_of, most_central, normal_offsets
 from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach, reach
 
 _DRAWS = 4000
-
-_NUMBERS_PER_HEIGHT = 12  # numbers that a shape-free contour reads for one of its heights
 
 
 def contour_band(
@@ -60,8 +57,7 @@ def contour_band(
     xr.Dataset
         Over "x": lower, upper, median [length]; share_reaching, the share of contours that extend to x; status, "ok",
         "beyond the reach of the rod", where family and prior alone continue the contour, or the reason why the band is
-        NaN. An average has the attributes averaged_by, "evidence" or "stacking", and
-        weights, of the families (JSON).
+        NaN. An average has the attributes averaged_by, "evidence" or "stacking", and weights, of the families (JSON).
 
     Raises
     ------
@@ -96,53 +92,115 @@ def contour_band(
     else:
         tree = cast(xr.DataTree, posterior)  # others are refused below
         heights = contour_heights(tree, at) if align is None else _aligned_heights(tree, at, align)
-    share = np.isfinite(heights).mean(axis=0)
-    lower, median, upper = quantile_band(heights, probability, simultaneous)
+    return _labelled(heights, at, posterior, probability, simultaneous).assign_attrs(average)
+
+
+def normal_band(
+    posterior: xr.DataTree,
+    x: ArrayLike,
+    probability: float = 0.95,
+    simultaneous: bool = False,
+    *,
+    reference: Contour | None = None,
+    align: str | None = None,
+) -> xr.Dataset:
+    """Return the band in which the contour lies with a given probability, measured along normals of a reference.
+
+    On a steep flank the width of a band in y is dominated by the slope; the width along the normal is not.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    x : array_like, shape (n,)
+        Positions on the reference at which the normals start, in the record's unit of length.
+    probability : float
+        Probability of the band, in (0, 1).
+    simultaneous : bool
+        As in `contour_band`: if True, the probability holds at all normals at once.
+    reference : Contour, optional
+        By default the most central draw: the one with the smallest sum of distances between its heights at these x and
+        their medians. A pointwise median need not be convex, and the most probable draw may lie at the edge of a
+        narrow ridge.
+    align : {"translation", "rigid", "similarity"}, optional
+        As in `contour_band`, onto this reference: the band of the shape alone.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "x": y and slope_angle of the reference; lower, median and upper, the signed distances of contours from it
+        [length], positive into the object; both edges as points, lower_x, lower_y, upper_x, upper_y [length];
+        share_reaching, the share of contours that the normal meets; status as in `contour_band`.
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not in (0, 1), x is not a list of finite numbers, the reference is not one contour, or the
+        alignment is unknown.
+
+    Examples
+    --------
+    >>> values = {"r": np.array([[0.5, 0.6, 0.7]]), "q": np.array([[0.5, 0.4, 0.3]]), "x_c": np.zeros((1, 3))}
+    >>> tree = xr.DataTree.from_dict({"posterior": xr.Dataset({k: (("chain", "draw"), v) for k, v in values.items()})})
+    >>> tree.attrs = {"family": "circle", "units": "dimensionless"}
+    >>> normal_band(tree, [0.0, 0.3, 0.55], 0.5)["upper"].values.round(12)  # circles about one centre
+    array([0.05, 0.05, 0.05])
+    """
+    at = grid_points(x)
+    contours = contours_drawn(posterior)
+    if reference is None:
+        reference = most_central(contours, at)
+    check_single("reference", reference, "give one contour, or none for the most central draw")
+    feet = feet_of(reference, at)
+    moves = None if align is None else _moves_onto(reference, contours, posterior, at, align)
+    offsets = normal_offsets(contours, feet, moves)
+    band = _labelled(offsets, at, posterior, probability, simultaneous, " the normal")
+    band["status"] = "x", np.where(np.isnan(feet.y), "the reference ends before", band["status"].values)
+    points = {"y": feet.y}
+    for edge in ("lower", "upper"):
+        points[f"{edge}_x"] = feet.x - band[edge].values * np.sin(feet.slope_angle)
+        points[f"{edge}_y"] = feet.y + band[edge].values * np.cos(feet.slope_angle)
+    unit = length_unit(posterior)
+    band = band.assign({name: ("x", values, unit) for name, values in points.items()})
+    return band.assign(slope_angle=("x", feet.slope_angle, {"units": "rad"}))
+
+
+def _labelled(
+    draws: Floats, x: Floats, posterior: xr.DataTree | xr.Dataset, probability: float, simultaneous: bool, end: str = ""
+) -> xr.Dataset:
+    """Return the band of draws, shape (contours, x), which are NaN where contours end, before `end`."""
+    lower, median, upper = quantile_band(draws, probability, simultaneous)
+    share = np.isfinite(draws).mean(axis=0)
     status = np.select(
-        [(share == 1.0) & beyond_reach(posterior, at), share == 1.0, share > 0.0],
-        [BEYOND_REACH, "ok", "some contours end before"],
-        "all contours end before",
+        [(share == 1.0) & beyond_reach(posterior, x), share == 1.0, share > 0.0],
+        [BEYOND_REACH, "ok", f"some contours end before{end}"],
+        f"all contours end before{end}",
     )
     unit = length_unit(posterior)
+    edges = {"lower": ("x", lower, unit), "median": ("x", median, unit), "upper": ("x", upper, unit)}
     return xr.Dataset(
-        {
-            "lower": ("x", lower, unit),
-            "median": ("x", median, unit),
-            "upper": ("x", upper, unit),
-            "share_reaching": ("x", share, {"units": "1"}),
-            "status": ("x", status),
-        },
-        coords={"x": ("x", at, unit)},
-        attrs={"probability": probability, "simultaneous": int(simultaneous), **average},
+        edges | {"share_reaching": ("x", share, {"units": "1"}), "status": ("x", status)},
+        coords={"x": ("x", x, unit)},
+        attrs={"probability": probability, "simultaneous": int(simultaneous)},
     )
 
 
 def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Floats:
     """Heights at x of up to `most` contours, evenly picked from the posterior's draws; shape (contours, x)."""
-    contours = contours_drawn(posterior, most)
-    return _heights(contours, np.broadcast_to(x, (contours.shape[0], x.size)))
-
-
-def _heights(contours: Contour, x: Floats) -> Floats:
-    """Return the heights of n contours, each at its own x of shape (n, k)."""
-    heights = np.empty(x.shape)
-    with np.errstate(over="ignore"):  # far out, where no contour is
-        for block in blocks(len(heights), _NUMBERS_PER_HEIGHT * x.shape[1]):
-            heights[block] = contours.take(block[:, None]).height(x[block])
-    return heights
+    return heights_of(contours_drawn(posterior, most), x)
 
 
 def _aligned_heights(posterior: xr.DataTree, x: Floats, align: str) -> Floats:
     """Heights at x of contours moved onto the most central one; shape (contours, x)."""
     contours = contours_drawn(posterior)
     reference = most_central(contours, x)
-    feet, moves = feet_of(reference, x), moves_onto(reference, contours, posterior, x, align)
+    feet, moves = feet_of(reference, x), _moves_onto(reference, contours, posterior, x, align)
     if align == "translation":
-        return _heights(contours, x - moves.shift[0][:, None]) + moves.shift[1][:, None]
+        return heights_of(contours, x - moves.shift[0][:, None]) + moves.shift[1][:, None]
     return feet.y + normal_offsets(contours, feet._replace(slope_angle=np.zeros_like(x)), moves)
 
 
-def moves_onto(reference: Contour, contours: Contour, posterior: xr.DataTree, x: Floats, align: str) -> Moves:
+def _moves_onto(reference: Contour, contours: Contour, posterior: xr.DataTree, x: Floats, align: str) -> Moves:
     """Return the moves of contours onto one, where it was touched, or at x if that is not known."""
     at = reach(posterior) if "events" in posterior.children else x
     return aligned(contours, feet_of(reference, at), align)

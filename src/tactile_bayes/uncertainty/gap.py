@@ -15,6 +15,7 @@ from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws, contour_events
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 from tactile_bayes.uncertainty.certificate import Triangle, triangle
+from tactile_bayes.uncertainty.offsets import heights_of
 from tactile_bayes.uncertainty.quantiles import central_levels
 
 _GRID_POINTS = 101  # number of grid points of x across the gap
@@ -157,8 +158,7 @@ def _refuse_no_gap(events: xr.Dataset) -> None:
 
 def _triangles(contours: Contour, certificate: Triangle, x: Floats, levels: tuple[float, ...]) -> dict[str, Floats]:
     """Return the curves at x between which the triangles lie; beyond its own gap a contour is known by contact."""
-    count = contours.shape[0]
-    heights = np.broadcast_to(contours.take(np.arange(count)[:, None]).height(x), (count, x.size))
+    heights = heights_of(contours, x)
     lower, upper = (np.where(np.isnan(edge), heights, edge) for edge in certificate.between(x))
     return {
         "triangle_lower": np.quantile(lower, levels[0], axis=0),

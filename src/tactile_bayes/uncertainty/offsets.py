@@ -17,6 +17,7 @@ from tactile_bayes.numerics.selection import evenly_spread
 # What the moves of `aligned` consist of, in the terms of Procrustes analysis, and the number of their columns.
 ALIGNMENTS = {"translation": 2, "rigid": 3, "similarity": 4}
 
+_NUMBERS_PER_HEIGHT = 12  # numbers that a shape-free contour reads for one of its heights
 _BLOCK = 100_000  # number of normals that are searched at once
 # Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is.
 _SLOWEST = float(np.finfo(float).tiny)
@@ -71,10 +72,19 @@ def feet_of(contour: Contour, x: Floats) -> Feet:
     return Feet(locus.x, locus.y, locus.slope_angle)
 
 
+def heights_of(contours: Contour, x: Floats) -> Floats:
+    """Return the heights of n contours at x, shape (k,), or each at its own x, shape (n, k); shape (n, k)."""
+    x = np.broadcast_to(x, (contours.shape[0], x.shape[-1]))
+    heights = np.empty(x.shape)
+    with np.errstate(over="ignore"):  # far out, where no contour is
+        for block in blocks(len(heights), _NUMBERS_PER_HEIGHT * x.shape[1]):
+            heights[block] = contours.take(block[:, None]).height(x[block])
+    return heights
+
+
 def most_central(contours: Contour, x: Floats) -> Contour:
     """Return the contour with heights nearest to the pointwise medians, among those defined at the most grid points."""
-    every = np.arange(contours.shape[0])[:, None]
-    heights = np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
+    heights = heights_of(contours, x)
     reaching = np.isfinite(heights)
     some = reaching.any(axis=0)
     away = np.nansum(np.abs(heights[:, some] - np.nanmedian(heights[:, some], axis=0)), axis=1)
