@@ -80,9 +80,9 @@ def test_the_standard_error_is_the_scatter_of_estimates(kept, wider):
     for _ in range(100):
         draws = wandering_draws(*line.posterior([1, 2, 5] if wider else ()), (4, 250), rng, kept)
         logs = line.log_densities(draws)[..., [1, 2, 5]]
-        runs.append(left_out_from_wider(logs, 0) if wider else left_out(logs))
-    scatter = np.std([run.log_density for run in runs], axis=0)
-    stated = np.sqrt(np.mean([run.standard_error**2 for run in runs], axis=0))
+        runs.append(left_out_from_wider(logs, 0) if wider else left_out(logs)[:2])
+    estimates, errors = np.moveaxis(runs, 1, 0)
+    scatter, stated = np.std(estimates, axis=0), np.sqrt(np.mean(errors**2, axis=0))
     assert ((stated > 0.7 * scatter) & (stated < 1.4 * scatter)).all()
 
 
@@ -117,11 +117,8 @@ def test_from_a_wider_posterior_they_are_right_also_where_no_tail_can_be_trusted
     events = [0, 4, 7]
     draws = wandering_draws(*line.posterior(events), (4, 4000), np.random.default_rng(5), kept)
     for place, i in enumerate(events):
-        found = left_out_from_wider(line.log_densities(draws)[..., events], place)
-        assert abs(found.log_density - line.exact(i)) < SIGMAS * found.standard_error
-        assert 10.0 < found.effective < 16_000.0
-    alone = left_out_from_wider(line.log_densities(draws)[..., [4]], 0)
-    assert alone.effective == pytest.approx(16_000.0)
+        found, error = left_out_from_wider(line.log_densities(draws)[..., events], place)
+        assert abs(found - line.exact(i)) < SIGMAS * error < np.inf
 
 
 # --- Samples that know of one another ---------------------------------------------------------------------------
@@ -201,19 +198,16 @@ def test_draws_that_exclude_a_sample_have_no_weight():
     logs = np.zeros((1, 40, 2))
     logs[0, :20, 0] = -np.inf
     logs[0, ::2, 1] = np.log(0.5)
-    found = left_out_from_wider(logs, 1)
-    assert found.log_density == pytest.approx(np.log(0.75))
-    assert found.effective == pytest.approx(20.0)
-    assert 0.0 < found.standard_error < np.inf
+    found, error = left_out_from_wider(logs, 1)
+    assert found == pytest.approx(np.log(0.75))
+    assert 0.0 < error < np.inf
 
 
 def test_without_draws_nothing_is_known():
     logs = np.full((1, 40, 2), -np.inf)
-    found = left_out_from_wider(logs, 0)
-    assert np.isnan(found.log_density)
-    assert found[1:] == (np.inf, 0.0)
+    assert left_out_from_wider(logs, 0) == (pytest.approx(np.nan, nan_ok=True), np.inf)
     logs[..., 1] = 0.0
-    assert left_out_from_wider(logs, 0) == (-np.inf, np.inf, pytest.approx(40.0))
+    assert left_out_from_wider(logs, 0) == (-np.inf, np.inf)
 
 
 def test_one_draw_does_not_pass_for_many():
@@ -221,9 +215,7 @@ def test_one_draw_does_not_pass_for_many():
     logs = np.zeros((4, 100, 2))
     logs[2, 7, 0] = 100.0
     logs[..., 1] = np.random.default_rng(15).normal(size=(4, 100))
-    found = left_out_from_wider(logs, 1)
-    assert found.effective == pytest.approx(1.0)
-    assert found.standard_error == np.inf
+    assert left_out_from_wider(logs, 1)[1] == np.inf
 
 
 # --- Models beside each other -----------------------------------------------------------------------------------
@@ -261,13 +253,6 @@ def test_models_that_exclude_samples_of_each_other_are_both_needed():
 # --- What is refused --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("logs", "named"),
-    [
-        (np.zeros((4, 6, 2)), ["24 draws", 25]),
-        (np.full((4, 50, 2), -np.inf), ["sample 0", "-inf", "draw 0", "chain 0"]),
-    ],
-)
-def test_what_cannot_be_is_refused(logs, named):
-    with refused(ParameterError, *named):
-        left_out(logs)
+def test_too_few_draws_are_refused():
+    with refused(ParameterError, "24 draws", 25):
+        left_out(np.zeros((4, 6, 2)))

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import logsumexp
 
 from helpers.contour_posteriors import CELL, swept
-from tactile_bayes.comparison.left_out import predicted_samples
+from tactile_bayes.comparison.leave_one_out import predicted_samples
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem

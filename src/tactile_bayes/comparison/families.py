@@ -14,8 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_probability, check_switch, refused
-from tactile_bayes.comparison.leave_one_out import LeftOut, stacking_weights
-from tactile_bayes.comparison.left_out import predicted_samples
+from tactile_bayes.comparison.leave_one_out import LeftOut, predicted_samples, stacking_weights
 from tactile_bayes.comparison.verdict import verdict_on
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
@@ -48,7 +47,7 @@ GIVEN_UP = 100.0
 _HOPELESS = 20.0
 
 _KEPT_DRAWS = 2000  # largest number of draws of a contour that are kept of each family
-_BY_DRAW = ("family", "contour_draw", "contour_parameter")
+BY_DRAW = ("family", "contour_draw", "contour_parameter")
 
 
 class _Tried(NamedTuple):
@@ -75,11 +74,10 @@ def compare_families(
 ) -> xr.Dataset:
     """Compare families of contours for a record, and return the probability of each.
 
-    The posterior of each family is inferred and judged by three criteria, which need not agree. Its *evidence*, the
-    density of the record under the family's prior, gives the probability that the contour is of this family if it is
-    of one of them, with equal prior probabilities. *Leave-one-out* densities measure how well the family predicts a
-    sample from all the others, and hardly depend on the prior. The *check* tests whether the record looks like one of
-    the family at all: the most probable family may be wrong.
+    Each family is judged by three criteria, which need not agree. Its *evidence*, the density of the record under its
+    prior, gives the probability that the contour is of this family if it is of one of them, with equal prior
+    probabilities. *Leave-one-out* densities measure how well it predicts a sample from all others, and depend little on
+    the prior. The *check* tests whether the record looks like one of it at all: the most probable one may be wrong.
 
     Parameters
     ----------
@@ -105,37 +103,24 @@ def compare_families(
     xr.Dataset
         Over "family":
 
-        probability
-            Probability of the family if the contour is of one of them; NaN throughout if the evidence of a family that
-            might count is missing.
-        log_evidence, log_evidence_error
-            Logarithm of the evidence, and the error of its computation; NaN where the ensembles did not agree.
-        probability_by_width (prior_width, family)
-            Probability with priors of sizes, exponents, amplitude and length scale of ½, 1 and 2 times the width: if it
-            depends on the width, the record is hardly informative.
-        elpd, elpd_error
-            Expected log predictive density: the sum of the samples' leave-one-out log-densities, and its Monte-Carlo
-            error.
-        elpd_difference, elpd_difference_error
-            elpd less that of the family with the largest, and its standard error from the scatter between samples. A
-            difference of less than 4 is small (Sivula et al. 2020, arXiv:2008.10296).
-        weight
-            Weight of the family in the mixture that predicts best (stacking; Yao et al. 2018, doi 10.1214/17-BA1091).
-        largest_k (family)
-            Largest Pareto k̂ of the importance sampling; above 0.7 its density is unreliable (Vehtari et al. 2024,
-            JMLR 25(72)).
-        p_value, fits
-            Overall p-value of `check`, and True if the check passes; NaN and False where it was not made.
-        log_likelihood
-            Largest log-likelihood among the starting points of the walkers, which is near the family's maximum.
-        sampled
-            True if the family was sampled. A family whose largest log-likelihood is 100 below the best evidence is not
-            sampled, has no probability, and does not fit.
-        converged, steps, seconds
-            Convergence, number of steps and time [s] of the posterior.
-        contour_draws (family, contour_draw, contour_parameter)
-            Draws of the contour's parameters, in the order of the family's, of which `contour_band` computes a band
-            averaged over families; NaN beyond its number of parameters, and for families that were not sampled.
+        - probability, if the contour is of one of them; NaN throughout if an evidence that might count is missing;
+        - log_evidence and log_evidence_error, of its computation; NaN where the ensembles did not agree;
+        - probability_by_width, over "prior_width" too: with priors of sizes, exponents, amplitude and length scale ½, 1
+          and 2 times as wide; if it depends on the width, the record is hardly informative;
+        - elpd and elpd_error: expected log predictive density, the sum of the samples' leave-one-out log-densities, and
+          its Monte-Carlo error;
+        - elpd_difference and elpd_difference_error: elpd less that of the family with the largest, and its standard
+          error from the scatter between samples; less than 4 is small (Sivula et al. 2020, arXiv:2008.10296);
+        - weight in the mixture that predicts best (stacking; Yao et al. 2018, doi 10.1214/17-BA1091);
+        - largest_k: largest Pareto k̂ of the importance sampling; above 0.7 its density is unreliable (Vehtari et al.
+          2024, JMLR 25(72));
+        - p_value and fits: overall p-value of `check`, and whether it passes; NaN and False where it was not made;
+        - log_likelihood: the largest among the starting points of the walkers, near the family's maximum;
+        - sampled: False if the largest log-likelihood is 100 below the best evidence; such a family has no probability,
+          and does not fit;
+        - converged, steps and seconds: convergence, number of steps and time [s] of the posterior;
+        - contour_draws, over "contour_draw" and "contour_parameter": parameters in the family's order, of which
+          `contour_band` computes a band averaged over families; NaN beyond their number, and if not sampled.
 
         `log_density` (family, sample) holds the leave-one-out log-densities. Attributes: `verdict`, a sentence;
         `most_probable`; `none_fits` (1 if no family passes the check); `nuisances`, those inferred (JSON); `friction`
@@ -150,15 +135,14 @@ def compare_families(
 
     Notes
     -----
-    So that no family is favoured by its prior, sizes have priors under which the geometric mean radius of curvature of
-    a flank has the same median and spread in all families (`matched_priors`); everything else has the defaults of
-    `infer_contour`. The evidence is that of contours within reach, computed by bridge sampling (Meng & Wong 1996) from
-    the posterior's draws.
+    So that no family is favoured, sizes have priors under which the geometric mean radius of curvature of a flank has
+    the same median and spread in all families (`matched_priors`); all else has the defaults of `infer_contour`. The
+    evidence is that of contours within reach, by bridge sampling (Meng & Wong 1996) from the posterior's draws.
 
-    Leave-one-out leaves out a sample with its three channels. If a load cell drifts or has an unknown bias, a sample's
-    density is conditional on all other samples. Samples next to first contact and snap-off are predicted from a
-    posterior that is inferred again without them, since importance sampling cannot reach contours that would have let
-    go earlier; if the load cell drifts, they are left out for all families alike.
+    Leave-one-out leaves out a sample with its three channels, given all the others if a load cell drifts or has an
+    unknown bias. Samples next to first contact and snap-off are predicted from a posterior that is inferred again
+    without them, since importance sampling cannot reach contours that would have let go earlier; if the load cell
+    drifts, they are left out for all families alike.
 
     Examples
     --------
@@ -177,12 +161,11 @@ def compare_families(
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     check_function("progress", progress)
     compared = {family.name: family for family in checked_families(families)}
-    names = list(compared)
     experiment = Experiment(measured, rig_of(rig), SHAPE_FREE.name, settings.events)
     if experiment.rig.calibration is not None:
         refuse_other_rig(experiment.rig.calibration, experiment.about)
     length = rod_of(experiment.record).length
-    seeds = dict(zip(names, spawn(rng, len(names)), strict=True))
+    seeds = dict(zip(compared, spawn(rng, len(compared)), strict=True))
     tried: dict[str, _Tried] = {}
     problems = {
         name: contour_problem(replace(experiment, family=matched(family, length))) for name, family in compared.items()
@@ -209,9 +192,9 @@ def compare_families(
         p_value, passed = float(check.overall_p_value), bool(check.attrs["passed"])
         tried[name] = _Tried(ceiling, found.draws, evidence, predicted, p_value, passed)
     asked = {name: problem.about[name] for name in ("nuisances", "friction")}
-    comparison = _labelled({name: tried[name] for name in names}, asked)
+    comparison = _labelled({name: tried[name] for name in compared}, asked)
     drawn = [(family, tried[name].draws) for name, family in compared.items()]
-    comparison["contour_draws"] = (_BY_DRAW, _contour_draws(drawn))
+    comparison["contour_draws"] = (BY_DRAW, _contour_draws(drawn))
     record = experiment.record
     about = {"data_sha256": record_hash(record), "units": record.attrs["units"], **reach_attributes(record)}
     return comparison.assign_attrs(about)

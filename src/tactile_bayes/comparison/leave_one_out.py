@@ -17,12 +17,19 @@ from scipy.special import logsumexp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contour import Sampled
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import ContourProblem
 from tactile_bayes.inference.densities import effective_number
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
 from tactile_bayes.inference.importance import LARGEST_K, pareto_smoothed, weighed
+from tactile_bayes.inference.starts.contour_start import walk_of
+from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 _LEAST_DRAWS = 25  # smallest number of draws; a fifth of them, the tail, suffices to fit two parameters
-_LEAST_EFFECTIVE = 10.0  # number of effective draws below which their scatter does not estimate the error of their mean
+_LEAST_EFFECTIVE = 10.0  # number of effective draws below which their scatter is no estimate of an error
 _SAME = 1e-12  # difference of logarithms below which weights are equal
+_DRAWS = 2000  # largest number of draws under which densities are computed
 _OFF = 1e-5  # largest loss of log-density per sample of the stacking weights relative to the best
 
 
@@ -37,39 +44,75 @@ class LeftOut(NamedTuple):
     pareto_k: Floats
 
 
-class FromWider(NamedTuple):
-    """Predictive log-density of one sample given all the others, from a posterior given fewer samples."""
+def predicted_samples(problem: ContourProblem, sampled: Sampled, *, seed: Seed, settings: SamplerSettings) -> LeftOut:
+    """Return the leave-one-out densities of a record, of a sample's channels together in units of EI/L and EI/L².
 
-    log_density: float  # NaN where no draw has any weight
-    # Monte-Carlo error, allowing for autocorrelation; infinite with fewer than 10 effective draws.
-    standard_error: float
-    effective: float  # effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation reduces it further
+    Next to first contact and snap-off the posterior has none of the contours that the record without a sample allows:
+    these samples are predicted from a posterior without any of them, and have no k̂. If the load cell drifts or has an
+    unknown bias, or beside a discrepancy, they are NaN.
+    """
+    model = problem.model
+    logs = _densities(model, sampled.draws)
+    found = left_out(logs)
+    events = model.likelihood.segments.event_samples(problem.loaded)
+    chosen = np.unique(events[events >= 0])
+    found.pareto_k[chosen] = np.nan
+    if _is_correlated(model):
+        found.log_density[chosen] = found.standard_error[chosen] = np.nan
+        return found
+    seeds = spawn(seed, 2)
+    wider = problem.without(np.isin(np.arange(logs.shape[-1]), chosen))
+    walk = walk_of(wider, seeds[0], settings)
+    draws = sample(
+        wider.log_probability,
+        walk.start,
+        names=wider.names,
+        seed=seeds[1],
+        settings=settings,
+        coordinates=walk.coordinates,
+    )
+    draws.refuse_interrupted(f"{model.family.name} without some samples")
+    of_events = _densities(model, draws)[..., chosen]
+    for i, of_sample in enumerate(chosen):
+        found.log_density[of_sample], found.standard_error[of_sample] = left_out_from_wider(of_events, i)
+    return found
+
+
+def _is_correlated(model: ContourModel) -> bool:
+    cell = model.likelihood.load_cell
+    return bool(cell.drift or any(cell.bias_uncertainty) or model.noise.of_discrepancy)
+
+
+def _densities(model: ContourModel, draws: Draws) -> Floats:
+    """Return log-densities of samples, conditional on the others if correlated, shape (chains, draws, samples)."""
+    chains, _, parameters = draws.samples.shape
+    kept = draws.evenly(_DRAWS // chains)
+    points = draws.samples[:, kept].reshape(-1, parameters)
+    logs = []
+    for part in np.array_split(points, max(1, len(points) // 200)):
+        if _is_correlated(model):
+            loads, _, discrepancy = model.loads_and_discrepancy(part)
+            cell, measured, scale = model.likelihood.load_cell, model.likelihood.measured, model.noise_scale(part)
+            logs.append(cell.log_density_left_out(measured, loads[:, 0], noise_scale=scale, discrepancy=discrepancy))
+        else:
+            logs.append(model.log_likelihood(part, pointwise=True))
+    return np.concatenate(logs).reshape(chains, kept.size, -1)
 
 
 def largest_k(draws: int) -> float:
-    """Return the Pareto k̂ above which so many draws do not represent the posterior without a sample.
-
-    It is the smaller of 1 − 1 / log₁₀ draws and 0.7 (Vehtari et al. 2024, JMLR 25(72)).
-    """
+    """Return the Pareto k̂ above which so many draws are too few (Vehtari et al. 2024, JMLR 25(72))."""
     return min(1.0 - 1.0 / math.log10(draws), LARGEST_K)
 
 
 def left_out(log_densities: Floats) -> LeftOut:
     """Return leave-one-out densities by Pareto-smoothed importance sampling, from (chains, draws, samples).
 
-    Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. A small k̂ is no proof beside a jump: see
-    `left_out_from_wider`.
+    Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. Beside a jump a small k̂ is no proof.
     """
     logs = np.asarray(log_densities, dtype=np.float64)
     chains, draws, samples = logs.shape
     if chains * draws < _LEAST_DRAWS:
         raise ParameterError(f"log_densities has {chains * draws} draws: give {_LEAST_DRAWS} at least")
-    if not np.isfinite(logs).all():
-        chain, draw, sample = np.argwhere(~np.isfinite(logs))[0].tolist()
-        raise ParameterError(
-            f"the log-density of sample {sample} is {float(logs[chain, draw, sample])!r} at draw {draw} of chain "
-            f"{chain}: give draws of the posterior, in which no sample is impossible"
-        )
     found = LeftOut(*np.empty((3, samples)))
     worst = largest_k(chains * draws)
     for i in range(samples):
@@ -81,28 +124,26 @@ def left_out(log_densities: Floats) -> LeftOut:
     return found
 
 
-def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
-    """Return the predictive density of a sample given all the others, from a posterior without it and some more.
+def left_out_from_wider(log_densities: Floats, chosen: int) -> tuple[float, float]:
+    """Return the log-density of a sample i given all the others, and its error, from draws without it and others, E.
 
-    A sample beside a jump of the load excludes values alone, which draws of the whole posterior do not reach. Given
-    draws without the samples E, log-densities (chains, draws, events), it is Σ_s w_s p(y_i | θ_s) / Σ_s w_s with w_s =
-    Π_{j in E, j ≠ i} p(y_j | θ_s).
+    A sample beside a jump of the load excludes values alone, which draws of the whole posterior do not reach. From
+    log-densities (chains, draws, E) it is Σ_s w_s p(y_i | θ_s) / Σ_s w_s with w_s = Π_{j in E, j ≠ i} p(y_j | θ_s); NaN
+    where no draw has any weight. The error is infinite with fewer than 10 effective draws.
     """
     logs = np.asarray(log_densities, dtype=np.float64)
     log_weights, log_density = np.delete(logs, chosen, axis=-1).sum(axis=-1), logs[..., chosen]
     if not np.isfinite(log_weights).any():
-        return FromWider(math.nan, math.inf, 0.0)
+        return math.nan, math.inf
     log_weights = weighed(log_weights.ravel())[0].reshape(log_weights.shape)
-    effective = float(effective_number(np.exp(log_weights.ravel())))
     found, error = _weighed(log_weights, log_density)
-    return FromWider(found, error if effective >= _LEAST_EFFECTIVE else math.inf, effective)
+    return found, error if effective_number(np.exp(log_weights.ravel())) >= _LEAST_EFFECTIVE else math.inf
 
 
 def stacking_weights(log_densities: Floats) -> Floats:
-    """Return the weights, (models,), with the best leave-one-out predictions, from (models, samples): stacking.
+    """Return the weights, (models,), of the mixture with the best leave-one-out predictions, from (models, samples).
 
-    They maximise Σ_i log Σ_k w_k p_k(y_i | all other y), a convex problem, to 1e-5 per sample (Yao et al. 2018, doi
-    10.1214/17-BA1091).
+    They maximise Σ_i log Σ_k w_k p_k(y_i | all other y) to 1e-5 per sample (Yao et al. 2018, doi 10.1214/17-BA1091).
     """
     logs = np.asarray(log_densities, dtype=np.float64)
     densities = np.exp(logs - logs.max(axis=0))
@@ -133,8 +174,7 @@ def stacking_weights(log_densities: Floats) -> Floats:
 def _smoothed(log_density: Floats) -> tuple[Floats, float]:
     """Return logarithms of weights in proportion to 1 / density, with sum one and a smoothed tail, and its k̂."""
     efficiency = _efficiency(np.exp(log_density - log_density.max()))
-    tail = int(3.0 * math.sqrt(log_density.size / efficiency))
-    tail = min(tail, log_density.size // 5)
+    tail = min(int(3.0 * math.sqrt(log_density.size / efficiency)), log_density.size // 5)
     lowest = np.partition(log_density, tail, axis=None)[: tail + 1]
     logs = -log_density.ravel()
     plain = weighed(logs)[0].reshape(log_density.shape)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.special import softmax
 
 from tactile_bayes.checks import check_function, check_numbers, check_path
-from tactile_bayes.comparison.families import GIVEN_UP, checked_families, matched, with_known
+from tactile_bayes.comparison.families import BY_DRAW, GIVEN_UP, checked_families, matched, with_known
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.family import Family
@@ -30,6 +30,7 @@ from tactile_bayes.uncertainty.averaged_contours import averaged_heights
 
 _KIND = "streams of families of tactile-bayes"
 
+_OF_STREAM = ("effective_number", "correlation", "log_density_shift", "e_value")
 _DRAWS = 4000  # number of contours from which averaged heights are computed
 _KEPT_DRAWS = 1000  # number of draws of a contour that are in a result, of each family
 
@@ -106,12 +107,7 @@ class StreamComparison:
         return cast(xr.Dataset, self._streams[self._left()[0]].record)
 
     def update(self, samples: xr.Dataset) -> xr.Dataset:
-        """Take new samples into account, and return the families' probabilities.
-
-        Parameters
-        ----------
-        samples : xr.Dataset
-            As for `Stream.update`.
+        """Take new samples into account, as `Stream.update` does, and return the families' probabilities.
 
         Returns
         -------
@@ -163,10 +159,7 @@ class StreamComparison:
     def latest(self) -> xr.Dataset:
         """Return the result of `update` for the record so far, without `seconds` and `may_stop`.
 
-        Raises
-        ------
-        InferenceError
-            Before the first update.
+        Raises InferenceError before the first update.
         """
         record = self._known_record()
         every = {name: self._streams[name].latest() for name in self._left()}
@@ -177,22 +170,15 @@ class StreamComparison:
                 drawn = self._streams[name].contour_draws(_KEPT_DRAWS)
                 of_family[:, :size] = with_known(self._compared[name], drawn)
 
-        def of_each(what: str, otherwise: float = np.nan) -> tuple[str, list[float]]:
-            return "family", [float(every[name][what]) if name in every else otherwise for name in self._families]
+        def of_each(what: str, otherwise: float = np.nan) -> list[float]:
+            return [float(every[name][what]) if name in every else otherwise for name in self._families]
 
         logs = of_each("log_evidence", -np.inf)
-        probability = softmax(logs[1])
+        probability = softmax(logs)
+        columns = {"probability": probability, "log_evidence": logs, **{name: of_each(name) for name in _OF_STREAM}}
         found = xr.Dataset(
-            {
-                "probability": ("family", probability),
-                "log_evidence": logs,
-                "effective_number": of_each("effective_number"),
-                "correlation": of_each("correlation"),
-                "log_density_shift": of_each("log_density_shift"),
-                "e_value": of_each("e_value"),
-                "contour_draws": (("family", "contour_draw", "contour_parameter"), draws),
-                "samples": record.sizes["sample"],
-            },
+            {name: ("family", values) for name, values in columns.items()}
+            | {"contour_draws": (BY_DRAW, draws), "samples": record.sizes["sample"]},
             coords={"family": self._families},
             attrs={
                 "most_probable": self._families[int(np.argmax(probability))],
@@ -208,11 +194,6 @@ class StreamComparison:
 
     def posterior(self, family: str | None = None) -> xr.DataTree:
         """Return the posterior of a family, by default of the most probable one, as `Stream.posterior` does.
-
-        Parameters
-        ----------
-        family : str, optional
-            One of the families that are compared.
 
         Raises
         ------
@@ -230,26 +211,14 @@ class StreamComparison:
         return self._streams[name].posterior()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write all streams to a file from which `resume` continues, whole or not at all.
+        """Write all streams to a file from which `resume` continues, whole or not at all, in place of one of its name.
 
-        Parameters
-        ----------
-        path : path-like
-            File to be written; it replaces one of its name.
-
-        Raises
-        ------
-        InferenceError
-            Before the first update.
+        Raises InferenceError before the first update.
         """
         self._known_record()
         left = self._left()
         tree = xr.DataTree.from_dict({f"family_{k}": self._streams[name].as_tree() for k, name in enumerate(left)})
-        tree.attrs = {
-            "kind": _KIND,
-            "families": json.dumps(self._families),
-            "lost": json.dumps(self._lost),
-        }
+        tree.attrs = {"kind": _KIND, "families": json.dumps(self._families), "lost": json.dumps(self._lost)}
         write_netcdf(tree, check_path("path", path))
 
     @classmethod
@@ -258,10 +227,8 @@ class StreamComparison:
 
         Parameters
         ----------
-        path : path-like
-            File that `save` has written.
-        record : xr.Dataset, optional
-            The record as it is now, as for `Stream.resume`.
+        path, record
+            As for `Stream.resume`.
         **arguments
             The arguments of `StreamComparison` as they were; `x` and `stop` may be others.
 

@@ -204,7 +204,7 @@ class _Checked:
         flat = (locus.slope_rate <= 0.0) & (locus.arclength_rate > 0.0)
         if np.any(straight := sliding_window_view(flat, _STRAIGHT, axis=0).all(axis=-1)):
             at, *index = _first(straight)
-            last = at + int(np.argmin(np.append(flat[at:, *index], False))) - 1
+            last = at + int(np.argmin(np.append(flat[_of(index)][at:], False))) - 1
             x = _text(locus.x[at, *index]), _text(locus.x[last, *index])
             raise self._refusal(tuple(index), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
 
