@@ -71,9 +71,9 @@ class ContourFamily(ABC):
         return ()
 
     @property
-    @abstractmethod
     def is_always_clear(self) -> bool:
         """True if a rod is clear of every contour of the family after snap-off."""
+        return False
 
     @abstractmethod
     def build(self, *values: Any) -> Contour:

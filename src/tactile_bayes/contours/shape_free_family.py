@@ -64,10 +64,6 @@ class ShapeFreeFamily(ContourFamily):
     def roughness(self) -> tuple[str, ...]:
         return ("amplitude", "length_scale", *self.directions)
 
-    @property
-    def is_always_clear(self) -> bool:
-        return False
-
     def build(self, *values: Any) -> Contour:
         r, amplitude, length, *weights, q, x_c = np.broadcast_arrays(*map(np.asarray, values))
         log_radius = self.radius.log_radius(np.log(r), amplitude, length, np.stack(weights, axis=-1))

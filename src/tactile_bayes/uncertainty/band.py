@@ -45,8 +45,8 @@ def contour_band(
     probability : float
         Probability of the band, in (0, 1).
     simultaneous : bool
-        If False, the probability holds at every x by itself. If True, it holds for all x at once: the pointwise band
-        is widened about the median, everywhere by the same factor, until it contains that share of contours.
+        If True, the probability holds for all x at once, not at every x by itself: the pointwise band is widened about
+        the median, everywhere by the same factor, until it contains that share of contours.
     align : {"translation", "rigid", "similarity"}, optional
         Give the band of the shape alone: each contour is first shifted, or also turned, or also scaled, onto the most
         central one, by least squares of the distances along its normals over what was touched, or at these x if the

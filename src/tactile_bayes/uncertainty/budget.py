@@ -34,24 +34,19 @@ def uncertainty_budget(posterior: xr.DataTree, probability: float = 0.95) -> xr.
     Returns
     -------
     xr.Dataset
-        Half widths are of the band along normals, as `normal_band` gives it: their median over what the posterior's
-        contours are touched at, from the first contact to the last.
+        Half widths [length] are medians of those of `normal_band`, over what is touched of the posterior's contours.
 
         Over "unknown", the unknowns of rig and load cell: share, the share of the variance that the unknown explains
-        by itself; half_width_if_known [length]. Unknowns that are correlated in the posterior share their shares, so
-        that the sum may exceed one.
+        by itself; half_width_if_known. Correlated unknowns share their shares, so that the sum may exceed one.
 
-        Scalars [length]: half_width; half_width_if_all_known, which noise and the contour's own parameters leave;
+        Scalars: half_width; half_width_if_all_known, which noise and the contour's own parameters leave;
         half_width_of_shape, of the contours shifted onto one another (`align="translation"`).
-
-        The attribute probability is that of the band.
 
     Raises
     ------
-    InferenceError
-        If the tree is no result of `infer_contour`, the rod touches none of its contours, or no normal meets them all.
-    ParameterError
-        If the probability is not in (0, 1).
+    InferenceError, ParameterError
+        If the tree is no result of `infer_contour`, the rod touches none of its contours, or no normal meets them all;
+        if the probability is not in (0, 1).
 
     Examples
     --------

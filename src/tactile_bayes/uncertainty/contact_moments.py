@@ -46,39 +46,32 @@ def contact_moments(posterior: xr.DataTree | xr.Dataset) -> xr.Dataset:
     >>> moments.tangent_sd.values.round(3), moments.normal_sd.values.round(3)
     (array([0.03]), array([0.01]))
     """
-    draws = contact_draws(posterior).transpose("chain", "draw", "sample", ...)
-    has = draws["contact_x"].notnull()
-    number = has.sum(_DRAWS)
+    draws = contact_draws(posterior).transpose(*_DRAWS, "sample", ...)
+    number = draws["contact_x"].notnull().sum(_DRAWS)
     enough = number >= LEAST_DRAWS
     variables: dict[str, Any] = {}
-    for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength"):
-        attrs = draws[name].attrs
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # a sample without a draw in contact
-            mean, spread = draws[name].mean(_DRAWS), draws[name].std(_DRAWS)
-        long_name = attrs.get("long_name", name.replace("_", " "))
-        variables[name] = mean.where(enough).assign_attrs(attrs)
-        variables[f"{name}_sd"] = spread.where(enough).assign_attrs(
-            {**attrs, "long_name": f"standard deviation of the {long_name}"}
-        )
-    x, y = (draws[name] - variables[name] for name in ("contact_x", "contact_y"))
-    covariance = np.empty((number.size, 2, 2))
-    covariance[:, 0, 0], covariance[:, 1, 1] = (variables[f"contact_{axis}_sd"].values ** 2 for axis in "xy")
-    covariance[:, 0, 1] = covariance[:, 1, 0] = ((x * y).sum(_DRAWS) / number.where(enough)).values
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a sample without a draw in contact
+        for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength"):
+            attrs = draws[name].attrs
+            spread = f"standard deviation of the {attrs.get('long_name', name.replace('_', ' '))}"
+            variables[name] = draws[name].mean(_DRAWS).where(enough).assign_attrs(attrs)
+            variables[f"{name}_sd"] = draws[name].std(_DRAWS).where(enough).assign_attrs(attrs | {"long_name": spread})
+        shared = xr.cov(draws["contact_x"], draws["contact_y"], _DRAWS, ddof=0).where(enough)
+    x_sd, y_sd = variables["contact_x_sd"], variables["contact_y_sd"]
+    covariance = np.moveaxis(np.array([[x_sd**2, shared], [shared, y_sd**2]]), -1, 0)
     tangent, normal = spread_across(covariance, variables["slope_angle"].values)
     with np.errstate(divide="ignore", invalid="ignore"):
-        correlation = covariance[:, 0, 1] / np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
-    unit = {"units": draws["contact_x"].attrs.get("units", "1")}
+        correlation = shared / (x_sd * y_sd)
     is_tangential = (draws["tangential"].sum(_DRAWS) > 0.5 * number).values
-    phase = np.where(enough, np.where(is_tangential, TANGENTIAL, TIP), NONE)
-    variables["contact_xy_correlation"] = (
-        "sample",
-        correlation,
-        {"units": "1", "long_name": "correlation of contact_x and contact_y"},
-    )
-    variables["tangent_sd"] = "sample", tangent, {**unit, "long_name": "standard deviation along the contour"}
-    variables["normal_sd"] = "sample", normal, {**unit, "long_name": "standard deviation across the contour"}
-    variables["contact_phase"] = "sample", np.array(PHASE_NAMES)[phase], {"units": "1", "long_name": "likelier phase"}
-    share = has.mean(_DRAWS).values
-    variables["contact_probability"] = "sample", share, {"units": "1", "long_name": "share of draws in contact"}
+    phase = np.array(PHASE_NAMES)[np.where(enough, np.where(is_tangential, TANGENTIAL, TIP), NONE)]
+    unit = draws["contact_x"].attrs.get("units", "1")
+    for name, values, units, meaning in (
+        ("contact_xy_correlation", correlation.values, "1", "correlation of contact_x and contact_y"),
+        ("tangent_sd", tangent, unit, "standard deviation along the contour"),
+        ("normal_sd", normal, unit, "standard deviation across the contour"),
+        ("contact_phase", phase, "1", "likelier phase"),
+        ("contact_probability", draws["contact_x"].notnull().mean(_DRAWS).values, "1", "share of draws in contact"),
+    ):
+        variables[name] = "sample", values, {"units": units, "long_name": meaning}
     return xr.Dataset(variables, coords={"sample": draws["sample"]})

@@ -12,6 +12,8 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.checks import check_probability, check_whole_number
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import contact_draws
+from tactile_bayes.numerics.blocks import blocks
+from tactile_bayes.uncertainty.contact_moments import LEAST_DRAWS
 
 _BLOCK = 1_000_000
 
@@ -21,15 +23,13 @@ class ContactRegion:
     """Highest-density region of a contact point: the smallest region of its probability.
 
     The density is a kernel density estimate from the draws, with a normal kernel of the draws' covariance and the
-    bandwidth n^(−1/6) of Scott's rule in two dimensions. The share of draws in
-    the region is its probability; the density at a draw leaves that draw out.
+    bandwidth n^(−1/6) of Scott's rule in two dimensions. The share of draws in the region, at each of which the density
+    leaves that draw out, is its probability.
     """
 
     probability: float
-    draws: Floats
-    """Contact points, shape (n, 2), in the record's unit of length."""
-    level: float
-    """Density on the boundary, in arbitrary units; see `density`."""
+    draws: Floats  # contact points, shape (n, 2), in the record's unit of length
+    level: float  # density on the boundary, in arbitrary units; see `density`
     _of_draws: Floats
     _white: Floats
     _to_white: Floats
@@ -81,8 +81,8 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     Returns
     -------
     ContactRegion
-        The region, in the record's unit of length. `contains` tests points, `least_probability` returns the
-        probability of the smallest region that holds a point, and `grid` serves for drawing.
+        In the record's unit of length. `contains` tests points, `least_probability` returns the probability of the
+        smallest region that holds a point, and `grid` serves for drawing.
 
     Raises
     ------
@@ -108,13 +108,13 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     of_sample = draws.sel(sample=sample)
     points = np.stack([of_sample["contact_x"].values.ravel(), of_sample["contact_y"].values.ravel()], axis=-1)
     points = points[np.isfinite(points).all(axis=1)]
-    if len(points) < 10:
+    if len(points) < LEAST_DRAWS:
         raise InferenceError(f"sample {sample} has no contact: its posterior has no draws")
     centre = points.mean(axis=0)
     variances, axes = np.linalg.eigh(np.cov(points.T))
     to_white = (axes / np.sqrt(np.maximum(variances, 1e-30))).T
     white = (points - centre) @ to_white.T
-    bandwidth = len(points) ** (-1.0 / 6.0)  # Scott's rule in two dimensions
+    bandwidth = len(points) ** (-1.0 / 6.0)
     others = np.sort((_kernel_sums(white, white, bandwidth) - 1.0) / (len(points) - 1))
     level = float(np.quantile(others, 1.0 - probability))
     return ContactRegion(probability, points, level, others, white, to_white, centre, bandwidth)
@@ -123,10 +123,9 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
 def _kernel_sums(at: Floats, centres: Floats, bandwidth: float) -> Floats:
     """Return the sum of the kernels around centres (n, 2) at points (m, 2); a kernel is 1 at its centre."""
     sums = np.empty(len(at))
-    step = max(1, _BLOCK // len(centres))
     squares = (centres * centres).sum(axis=1)
-    for begin in range(0, len(at), step):
-        part = at[begin : begin + step]
+    for block in blocks(len(at), len(centres), max(1, _BLOCK // len(centres))):
+        part = at[block]
         distance = (part * part).sum(axis=1)[:, None] + squares - 2.0 * (part @ centres.T)
-        sums[begin : begin + step] = np.exp(-0.5 / bandwidth**2 * np.maximum(distance, 0.0)).sum(axis=1)
+        sums[block] = np.exp(-0.5 / bandwidth**2 * np.maximum(distance, 0.0)).sum(axis=1)
     return sums

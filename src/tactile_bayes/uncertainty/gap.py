@@ -24,8 +24,8 @@ _GRID_POINTS = 101  # number of grid points of x across the gap
 def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr.DataTree | None = None) -> xr.Dataset:
     """Return the ends of the gap, the region to which convexity confines the contour there, and the posterior's band.
 
-    The prior enters the certificate only through the ends: between them a convex contour lies in the triangle of their
-    chord and their tangents. Each contour of the posterior has a triangle of its own, which gives intervals.
+    Between the ends a convex contour lies in the triangle of their chord and their tangents; the prior enters only
+    through the ends. Each contour of the posterior has a triangle of its own, which gives intervals.
 
     Parameters
     ----------
@@ -60,11 +60,9 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
 
     Raises
     ------
-    InferenceError
+    InferenceError, ParameterError
         If the record has sweeps in one direction only (one sweep only, if the base is carried), or no contour is
-        touched in all of them.
-    ParameterError
-        If the probability is not in (0, 1).
+        touched in all of them; if the probability is not in (0, 1).
 
     Notes
     -----
@@ -74,8 +72,8 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     rightmost end of the former and the leftmost end of the latter. If no gap remains, the smallest overlap is
     described.
 
-    Where a contour's own arcs reach beyond the gap's ends, its height is known by contact: there, triangle_lower and
-    triangle_upper count it as a triangle of no width. The band is therefore between them, up to the noise of the draws.
+    Where a contour's own arcs reach beyond the gap's ends, its height is known by contact, and counts as a triangle of
+    no width: the band is between triangle_lower and triangle_upper, up to the noise of the draws.
 
     Examples
     --------
@@ -114,8 +112,8 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         "right_y": (right.y, length),
         "left_slope_angle": (left.slope_angle, angle),
         "right_slope_angle": (right.slope_angle, angle),
-        "vertex_x": (np.broadcast_to(vertex_x, left_x.shape), length),
-        "vertex_y": (np.broadcast_to(vertex_y, left_x.shape), length),
+        "vertex_x": (vertex_x, length),
+        "vertex_y": (vertex_y, length),
         "apex_x": (certificate.apex_x[some], length),
         "apex_y": (certificate.apex_y[some], length),
         "triangle_height": (certificate.height[some], length),

@@ -26,19 +26,9 @@ from tactile_bayes.sweep import to_lab_frame
 
 _BLOCK = 200  # number of contours whose paths are traced at a time
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
-# Attributes of the posterior that hold for the contacts, too.
-_KEPT = (
-    "sampler",
-    "seed",
-    "settings",
-    "data_sha256",
-    "family",
-    "friction",
-    "nuisances",
-    "priors",
-    "converged",
-    "approximations",
-)
+# Attributes of the posterior that hold for the contacts, too: of its run, and of its model.
+_OF_RUN = ("sampler", "seed", "settings", "data_sha256", "converged", "approximations")
+_OF_MODEL = ("family", "friction", "nuisances", "priors")
 # Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw.
 _ANGLE_UNKNOWNS = ("drive_angle_offset", "backlash", "suspension_compliance")
 _DIMS = ("chain", "draw", "sample")
@@ -47,9 +37,8 @@ _DIMS = ("chain", "draw", "sample")
 def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree:
     """Return the joint posterior of contact point and slope angle at every sample, given the whole record.
 
-    Each draw is one contour with its contacts at all samples, so that the contacts of a draw belong together, unlike
-    those of `infer_contacts`, which uses each sample alone. The difference between the two shows how much the rest of
-    the record, and the family, tighten each contact.
+    Each draw is one contour with its contacts at all samples; `infer_contacts` uses each sample alone. The difference
+    shows how much the rest of the record, and the family, tighten each contact.
 
     Parameters
     ----------
@@ -64,9 +53,10 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
         In the layout of `infer_contacts`, in the record's units. Group `posterior`, dimensions (chain, draw, sample):
         contact_x, contact_y (on the object's surface), slope_angle, contact_arclength, drive_angle (the rod's slope at
         the pivot) where the encoder's offset or backlash, or the suspension's compliance was inferred, and tangential
-        (1 in tangential contact, 0 in tip contact); NaN where the contour of that draw is not in contact. Group
-        `sample_stats`, by sample: contact_probability, the share of draws in contact, and tangential_probability, the
-        share of these in tangential contact. Groups `observed_data` and `constant_data`: the record.
+        (1 in tangential contact, 0 in tip contact); NaN where the contour of that draw has no contact, before its first
+        contact and after its snap-off. Group `sample_stats`, by sample: contact_probability, the share of draws in
+        contact, and tangential_probability, the share of these in tangential contact. Groups `observed_data` and
+        `constant_data`: the record.
 
     Raises
     ------
@@ -74,11 +64,6 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
         If the argument is not a result of `infer_contour`, or its record is not the one that it was inferred from.
     ParameterError
         If `draws` is not a whole number from 1 up.
-
-    Notes
-    -----
-    A contour has no contact before its first contact and after its snap-off. Near these events only some of the
-    contours are touched, and the draws there are conditional on contact: contact_probability is their share.
 
     Examples
     --------
@@ -98,15 +83,11 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     # `infer_contour` picks the draws of which it keeps events and predictions by the same rule.
     picked = every.isel(draw=evenly_spread(every.sizes["draw"], draws))
     variables = _implied(posterior, record, picked)
-    tangential, has = variables["tangential"], np.isfinite(variables["tangential"])
-    share, tangential_count = has.mean(axis=(0, 1)), np.nansum(tangential, axis=(0, 1))
+    touched = np.isfinite(variables["tangential"]).sum(axis=(0, 1))
+    tangential, number = np.nansum(variables["tangential"], axis=(0, 1)), picked.sizes["chain"] * picked.sizes["draw"]
     stats = {
-        "contact_probability": ("sample", share, {"units": "1"}),
-        "tangential_probability": (
-            "sample",
-            np.divide(tangential_count, has.sum(axis=(0, 1)), out=np.full(share.size, np.nan), where=share > 0.0),
-            {"units": "1"},
-        ),
+        "contact_probability": ("sample", touched / number, {"units": "1"}),
+        "tangential_probability": ("sample", tangential / np.where(touched, touched, np.nan), {"units": "1"}),
     }
     units, sample = record.attrs["units"], np.arange(record.sizes["sample"])
     coords = {"chain": picked["chain"].values, "draw": picked["draw"].values, "sample": sample}
@@ -119,11 +100,10 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
             "constant_data": record[list(_CONSTANT)].drop_attrs(deep=False).assign_coords(sample=sample),
         }
     )
-    number = picked.sizes["chain"] * picked.sizes["draw"]
     tree.attrs = {
         "inference_library": "tactile-bayes",
         "inference_library_version": version("tactile-bayes"),
-        **{name: posterior.attrs[name] for name in _KEPT if name in posterior.attrs},
+        **{name: posterior.attrs[name] for name in _OF_RUN + _OF_MODEL if name in posterior.attrs},
         "draws": number,
         "dependence": "a draw is one contour, and its contacts at all samples lie on it",
         "message": f"contacts of {number} contours of the posterior; {posterior.attrs['message']}",

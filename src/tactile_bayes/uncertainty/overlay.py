@@ -53,13 +53,7 @@ class Overlay:
 
     @classmethod
     def of_band(cls, name: str, band: xr.Dataset) -> Overlay:
-        """Return the overlay of another run.
-
-        Raises
-        ------
-        InferenceError
-            If the band has no median.
-        """
+        """Return the overlay of another run; InferenceError if its band has no median."""
         known = np.flatnonzero(np.isfinite(band["median"].values))
         if known.size < 2:
             raise InferenceError(f"{name}: no contour reaches all of what was touched: there is no band to lay over")
@@ -68,12 +62,12 @@ class Overlay:
 
 
 class Distance(NamedTuple):
-    """Distance of the median of a band from another contour, over the stretch that both cover; NaN if there is none."""
+    """Distance of the median of a band from another contour, over the stretch that both cover; `overlay_distance`."""
 
-    rms: float  # root mean square, over x, of the distance normal to the other contour [length]
+    rms: float
     largest: float
-    at: float  # x of the largest [length]
-    share_inside: float  # share of positions x at which the other contour is inside the band
+    at: float
+    share_inside: float
     left: float
     right: float
 
@@ -89,10 +83,6 @@ def read_overlay(path: str | os.PathLike[str], posterior: xr.DataTree, probabili
         Posterior of the record, whose unit of length numbers without a unit have.
     probability : float
         Probability of the band of a run.
-
-    Returns
-    -------
-    Overlay
 
     Raises
     ------
@@ -130,11 +120,8 @@ def overlay_distance(band: xr.Dataset, overlay: Overlay) -> Distance:
     Returns
     -------
     Distance
-
-    Raises
-    ------
-    ParameterError
-        If one is not such an object.
+        rms over x, the largest and its x ("at"), share_inside, the share of x at which the other contour is inside the
+        band, and the ends of the stretch, left and right [length]; NaN if the two share none.
 
     Examples
     --------

@@ -30,10 +30,8 @@ def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr
 
     Raises
     ------
-    ParameterError
-        If the probability is not in (0, 1).
-    InferenceError
-        If the argument is not a result of `infer_contour`.
+    ParameterError, InferenceError
+        If the probability is not in (0, 1), or the posterior is no result of `infer_contour`.
 
     Examples
     --------
