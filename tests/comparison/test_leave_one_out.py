@@ -28,9 +28,6 @@ def wandering_draws(mean, covariance, shape, rng, kept=0.0):
     return mean + draws @ np.linalg.cholesky(covariance).T
 
 
-# --- A linear model, its noise known ----------------------------------------------------------------------------
-
-
 class Line:
     """y = X β + noise of 0.5, β standard normal."""
 
@@ -121,9 +118,6 @@ def test_from_a_wider_posterior_they_are_right_also_where_no_tail_can_be_trusted
         assert abs(found - line.exact(i)) < SIGMAS * error < np.inf
 
 
-# --- Samples that know of one another ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("further", [{"drift": WALK}, {"drift": WANDER, "correlation": SHARED}])
 def test_of_a_drifting_cell_they_are_those_of_all_that_is_normal(further):
     """Loads of an unknown size: one dense normal distribution of readings, with drift and size integrated out."""
@@ -146,9 +140,6 @@ def test_of_a_drifting_cell_they_are_those_of_all_that_is_normal(further):
     assert (np.abs(found.log_density - exact) < SIGMAS * found.standard_error).all()
     sequential = left_out(sheet.log_likelihood(measured, draws[..., None, None] * shape, pointwise=True))
     assert (np.abs(sequential.log_density - exact) > 100.0 * sequential.standard_error).any()
-
-
-# --- Weights of every kind --------------------------------------------------------------------------------------
 
 
 def test_they_are_those_of_arviz():
@@ -218,9 +209,6 @@ def test_one_draw_does_not_pass_for_many():
     assert left_out_from_wider(logs, 1)[1] == np.inf
 
 
-# --- Models beside each other -----------------------------------------------------------------------------------
-
-
 def test_stacking_is_the_best_point_of_a_grid():
     rng = np.random.default_rng(0)
     logs = rng.normal(size=(3, 60)) + rng.normal(size=(3, 1)) * 0.3
@@ -248,9 +236,6 @@ def test_models_that_exclude_samples_of_each_other_are_both_needed():
     logs[0, 3] = logs[1, 7] = -np.inf
     np.testing.assert_allclose(stacking_weights(logs), [0.5, 0.5], atol=1e-3)
     np.testing.assert_allclose(stacking_weights(np.nan_to_num(logs, neginf=-1e4)), [0.5, 0.5], atol=1e-3)
-
-
-# --- What is refused --------------------------------------------------------------------------------------------
 
 
 def test_too_few_draws_are_refused():

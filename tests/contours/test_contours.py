@@ -212,8 +212,6 @@ def test_the_radius_jumps_at_the_vertex_of_profile_four():
     np.testing.assert_allclose(iv.point([-1e-300, 0.0, 1e-300]), [[0, 0, 0], [0.3] * 3], atol=1e-90)
 
 
-# --- arrays of parameters --------------------------------------------------------------------------------------------
-
 KNOTS = np.linspace(-1.3, 1.3, 5)
 
 
@@ -271,9 +269,6 @@ def test_arrays_of_parameters_are_many_contours(make, data):
         table = flat.take(index).point(np.array([-0.3, 0.0, alpha]))
         assert np.shape(table) == (2, flat.shape[0], 3)
         np.testing.assert_array_equal(table[0][:, 2], flat.point(alpha)[0])
-
-
-# --- refusals -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -384,9 +379,6 @@ def test_shape_free_finds_the_circle_and_the_parabola():
         errors.append(np.abs(np.subtract(free.point(0.5 * alpha), parabola.point(0.5 * alpha))).max())
     assert errors[-1] < 1e-7
     assert errors[0] > 12 * errors[1] > 100 * errors[2]
-
-
-# --- as the rod sees it ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("mirror", [pytest.param(False, marks=pytest.mark.slow), True])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers.refusals import refused
@@ -35,11 +35,6 @@ def test_two_flanks_meet_in_their_vertex():
     assert contour.height(-0.2) == 0.3
 
 
-def test_a_power_law_is_as_high_as_wide_at_its_width():
-    contour = FAMILIES["power-law"].build(1.2, 2.5, 0.3, -0.2)
-    assert contour.height(1.0) == pytest.approx(0.3 + 1.2)
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_a_fit_to_exact_points_is_exact(name):
     family = family_named(name)
@@ -64,6 +59,7 @@ def test_outliers_do_not_rule_a_fit(name):
 
 
 @pytest.mark.parametrize("name", [*FLANKS, "ellipse/power-law"])
+@settings(deadline=None)
 @given(x=st.floats(-2.0, 2.0), y=st.floats(-2.0, 2.0), length=st.floats(0.01, 10.0), u=st.floats(0.01, 0.99))
 def test_priors_move_with_the_pivot_and_scale_with_the_rod(name, x, y, length, u):
     family = family_named(name)
@@ -81,15 +77,12 @@ def test_bounds_are_those_of_the_contour(name):
     """Beyond them it refuses, just within it does not."""
     family = family_named(name)
     for index, parameter in enumerate(family.parameters):
-        low, high = family.bounds[parameter]
-        for value, possible in ((low - 0.01, False), (low + 0.01, True), (high - 0.01, True), (high + 0.01, False)):
-            if not np.isfinite(value):
-                continue
-            values = list(CASES[name])
-            values[index] = value
-            if possible:
+        for end, inward in zip(family.bounds[parameter], (0.01, -0.01), strict=True):
+            if np.isfinite(end):
+                values = np.array(CASES[name])
+                values[index] = end + inward
                 family.build(*values)
-            else:
+                values[index] = end - inward
                 with pytest.raises(ContourError):
                     family.build(*values)
 

@@ -28,8 +28,6 @@ from tactile_bayes.contours import (
 )
 from tactile_bayes.errors import ContourError
 
-# --- what is right ---------------------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("n", [1.85, 1.9, 1.99])
 def test_a_vertex_that_is_almost_an_ordinary_one_is_right(n):
@@ -69,9 +67,6 @@ def test_a_family_of_ones_own_that_is_right():
     many = Hyperbola([0.3, 0.4])
     assert many.shape == (2,)
     np.testing.assert_allclose(many.height(0.2), np.sqrt(np.array([0.3, 0.4]) ** 2 + 0.04))
-
-
-# --- what is wrong ---------------------------------------------------------------------------------------------------
 
 
 def graph(g, slope, curvature, **members):
@@ -185,9 +180,6 @@ def test_rates_of_a_family_that_is_no_graph():
         check(Arc(0.7, error=1e-3))
 
 
-# --- parameters ------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("listed", "arrays"),
     [
@@ -261,5 +253,6 @@ def test_a_contour_without_parameters():
     bowl = Bowl()
     check(bowl)
     assert bowl == bowl != Bowl()
-    assert bowl in {bowl}
+    assert len({bowl, bowl, Bowl()}) == 2
+    assert Joined(bowl, Circle(1.0, 0.5)) == Joined(bowl, Circle(1.0, 0.5))
     assert np.isfinite(scan(bowl).sweeps[0].snap_off.drive_angle)

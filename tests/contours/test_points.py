@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, chi2
-from scipy.stats import t as student_t
 
 from helpers.refusals import refused
 from tactile_bayes import scan
@@ -42,9 +41,6 @@ def dented(depth, scatter, seed=0, count=100, at=0.3, half_width=0.15):
     return x, y + scatter * rng.standard_normal(count)
 
 
-# Accuracy
-
-
 @pytest.mark.parametrize(
     ("name", "height", "radius"), [("parabola", 1e-14, 1e-11), ("circle", 1e-6, 1e-3), ("quartic", 2e-5, 0.03)]
 )
@@ -57,8 +53,7 @@ def test_exact_points_are_followed(name, height, radius):
     contour = from_points(*measured(truth, left, right))
     x = np.linspace(left, right, 1001)
     assert np.abs(contour.height(x) - truth.height(x)).max() < height
-    inner = x[100:-100]
-    inner = inner[np.abs(inner) > 0.2] if name == "quartic" else inner
+    inner = x[100:-100] if name != "quartic" else x[100:-100][np.abs(x[100:-100]) > 0.2]
     true_radius = truth.radius_of_curvature(truth.locate(truth.parameter_of_x(inner)).slope_angle)
     _, slope, bend = contour.derivatives(inner)
     assert np.abs((1 + slope**2) ** 1.5 / bend / true_radius - 1).max() < radius
@@ -117,9 +112,6 @@ def test_six_points_are_enough():
     np.testing.assert_allclose(contour.height(x), 0.3 + x**2, atol=1e-12)
 
 
-# What every contour has
-
-
 @st.composite
 def convex_points(draw):
     """Points of a sum of a parabola, a power and a catenary, anywhere and in any unit, and their scatter."""
@@ -149,13 +141,8 @@ def test_every_contour_is_strictly_convex_and_smooth(points, tell):
     ends = contour.derivatives(breaks)[1]
     assert np.all((ends[:-1] < chord) & (chord < ends[1:]))
     for order in range(4):  # no jump at a break
-        derivative = contour.graph.derivative(order) if order else contour.graph
-        here, step = derivative(breaks[1:-1]), np.diff(breaks)[:-1]
-        before = sum(
-            contour.graph.c[4 - n, :-1] * step ** (n - order) * np.prod(np.arange(n, n - order, -1))
-            for n in range(order, 5)
-        )
-        size = np.abs(derivative(grid)).max() + np.abs(y).max() * (order == 0)
+        before, here = (contour.graph(at, order) for at in (np.nextafter(breaks[1:-1], lo), breaks[1:-1]))
+        size = np.abs(contour.graph(grid, order)).max() + np.abs(y).max() * (order == 0)
         np.testing.assert_allclose(before, here, rtol=0, atol=1e-9 * size)
 
 
@@ -163,8 +150,7 @@ def test_the_ends():
     x, y = measured(Parabola(0.5, 0.3), -1.0, 0.8)
     contour = from_points(x, y)
     np.testing.assert_array_equal(np.isnan(contour.height([-1.001, -1.0, 0.8, 0.801])), [True, False, False, True])
-    assert contour.end_name("left") == "the first point measured"
-    assert contour.end_name("right") == "the last point measured"
+    assert ["first" in contour.end_name("left"), "last" in contour.end_name("right")] == [True, True]
     assert contour.point(0.1)[0] == pytest.approx(np.tan(0.1))
 
 
@@ -192,9 +178,6 @@ def test_the_points_are_kept_as_they_were_and_the_text_is_short():
     assert len(repr(contour)) < 120
     with pytest.raises(ValueError, match="read-only"):
         contour.x[0] = 1.0
-
-
-# Dents
 
 
 def stretch(error):
@@ -230,18 +213,6 @@ def most(alarms_of, rate):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [10, 40])
-def test_false_alarms_of_the_bends_where_they_are_most_likely(count):
-    """A contour's own curvature speaks against an alarm: the rate is greatest for a line."""
-    rng, alarms, draws = np.random.default_rng(11), 0, 2000
-    for _ in range(draws):
-        u = np.sort(rng.uniform(-1, 1, count))
-        bends = Bends.of(u, rng.standard_normal(count), np.ones(count))
-        alarms += bends.errors.min() < -student_t.isf(FALSE_ALARM / bends.errors.size, np.inf)
-    assert alarms <= most(draws, FALSE_ALARM)
-
-
-@pytest.mark.slow
 def test_bends_are_standard_normal_on_a_line_and_never_negative_on_a_convex_arc():
     rng, count, draws = np.random.default_rng(12), 30, 2000
     u, noise = np.sort(rng.uniform(-1, 1, count)), rng.uniform(0.5, 2.0, count)
@@ -255,23 +226,22 @@ def test_bends_are_standard_normal_on_a_line_and_never_negative_on_a_convex_arc(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("count", "draws", "arc"),
-    [(count, 5000, lambda x: 0.0 * x) for count in (6, 8, 15, 40, 120)]
-    + [(count, 150, lambda x: np.maximum(0.0, x) ** 3) for count in (8, 40)],
+    ("count", "draws", "arc", "given"),
+    [(count, 5000, lambda x: 0.0 * x, None) for count in (6, 8, 15, 40, 120)]
+    + [(count, 2000, lambda x: 0.0 * x, 0.01) for count in (10, 40)]
+    + [(count, 150, lambda x: np.maximum(0.0, x) ** 3, None) for count in (8, 40)],
 )
-def test_false_alarms_with_the_scatter_estimated(count, draws, arc):
-    """About a line, and half a line."""
+def test_false_alarms(count, draws, arc, given):
+    """About a line, where they are most likely, and half a line; with the scatter estimated or given."""
     rng, alarms = np.random.default_rng(14), 0
     for _ in range(draws):
         x = np.sort(rng.uniform(-1, 1, count))
         try:
-            from_points(x, arc(x) + 0.01 * rng.standard_normal(count))
+            from_points(x, arc(x) + 0.01 * rng.standard_normal(count), scatter=given)
         except ContourError as error:
             alarms += "from a straight line" not in str(error)
     assert alarms <= most(draws, FALSE_ALARM)
 
-
-# Refusals of what cannot be a contour
 
 X = np.linspace(-1.0, 1.0, 20)
 
@@ -328,9 +298,6 @@ def test_scatter_and_repeated_points_are_no_outline():
         except ContourError:
             alarms += 1
     assert alarms <= most(1000, FALSE_ALARM)
-
-
-# The rod on it
 
 
 def test_the_record_of_the_fit_is_that_of_the_contour():

@@ -39,11 +39,9 @@ def test_places_are_found():
     alpha = np.array([-1.57, -1.0, -1e-9, 0.0, 0.3, 1.2, 1.57])
     x, _ = contours.take(np.array([[0], [1]])).point(alpha)
     np.testing.assert_allclose(contours.take(np.array([[0], [1]])).parameter_of_x(x), np.tile(alpha, (2, 1)), atol=1e-9)
-    low, high = contours.locate(-0.5 * np.pi).x, contours.locate(0.5 * np.pi).x
-    assert np.isfinite(contours.height(low + 1e-12)).all()
-    assert np.isfinite(contours.height(high - 1e-12)).all()
-    assert np.isnan(contours.height(low - 1e-6)).all()
-    assert np.isnan(contours.height(high + 1e-6)).all()
+    for end, outward in ((contours.locate(-0.5 * np.pi).x, -1.0), (contours.locate(0.5 * np.pi).x, 1.0)):
+        assert np.isfinite(contours.height(end - 1e-12 * outward)).all()
+        assert np.isnan(contours.height(end + 1e-6 * outward)).all()
     assert contours.take(0).height(0.1) == 0.3
 
 

@@ -1,6 +1,6 @@
 """Records of known contours, and posteriors that several tests look at: computed once, and not to be changed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -70,6 +70,14 @@ def tree(family: str, *, units: str = "dimensionless", **values: Any) -> xr.Data
     out = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
     out.attrs = {"family": family, "units": units}
     return out
+
+
+def touched(posterior: xr.DataTree, segments: Sequence[str] = ("forward",), **events: Any) -> xr.DataTree:
+    """The posterior with events of its contours, each of a shape that broadcasts with (chain, draw, segment)."""
+    shape = (*posterior["posterior"].to_dataset()["q"].shape, len(segments))
+    values = {name: (("chain", "draw", "segment"), np.broadcast_to(v, shape)) for name, v in events.items()}
+    posterior["events"] = xr.DataTree(xr.Dataset(values, coords={"segment": list(segments)}))
+    return posterior
 
 
 def assert_near(result: xr.DataTree, truth: dict[str, float], deviations: float = 4.0) -> None:

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from scipy.stats import norm
 
-from helpers.contour_posteriors import tree
+from helpers.contour_posteriors import touched, tree
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.uncertainty.budget import uncertainty_budget
@@ -29,11 +29,7 @@ def shifted(seed=1, size=40_000):
     posterior["posterior"] = xr.DataTree(
         draws.assign({name: (over, 2.0 + 3.0 * each) for name, each in zip(names, z[1:], strict=True)})
     )
-    ends = {"first_contact_x": 0.3, "snap_off_contact_x": -0.3}
-    posterior["events"] = xr.DataTree(
-        xr.Dataset({name: ((*over, "segment"), np.full((*none.shape, 1), x)) for name, x in ends.items()})
-    )
-    return posterior
+    return touched(posterior, first_contact_x=0.3, snap_off_contact_x=-0.3)
 
 
 def test_widths_and_shares_are_those_of_the_conditional_distributions():

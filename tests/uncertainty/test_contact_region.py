@@ -1,5 +1,7 @@
 """Regions of contacts: do they hold fresh points as often as they say, whatever their shape?"""
 
+import functools
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -15,14 +17,12 @@ def normal(rng, n):
     return rng.normal(size=(n, 2)) * [1.0, 0.01] @ [[0.8, 0.6], [-0.6, 0.8]]
 
 
-def banana(rng, n):
+def banana(rng, n, width=0.3):
     x = rng.normal(size=n)
-    return np.stack([x, x**2 + 0.3 * rng.normal(size=n)], axis=-1)
+    return np.stack([x, x**2 + width * rng.normal(size=n)], axis=-1)
 
 
-def thin_banana(rng, n):
-    x = rng.normal(size=n)
-    return np.stack([x, x**2 + 0.02 * rng.normal(size=n)], axis=-1)
+thin_banana = functools.partial(banana, width=0.02)
 
 
 def blocks(rng, n):
@@ -141,9 +141,6 @@ def test_least_probabilities_of_fresh_points_are_uniform(name):
         for _ in range(100)
     ]
     assert abs(np.mean(means) - 0.5) < 4.0 * np.std(means) / 10.0 + 0.002
-
-
-# --- What is refused --------------------------------------------------------------------------------------------
 
 
 DRAWS = posterior(np.zeros((400, 2)))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from helpers.contour_posteriors import TRUTH, posterior
+from helpers import contour_posteriors as posteriors
+from helpers.contour_posteriors import TRUTH, posterior, touched
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError
@@ -16,26 +17,17 @@ BOTH = ["forward", "backward"]
 A, Q, X_C = 0.5, 0.3, 0.05
 
 
-def tree(last, segments=BOTH, *, first=None, a=A, q=Q, x_c=X_C, units="SI"):
+def tree(last, segments=BOTH, *, first=None, a=A, q=Q, x_c=X_C):
     """Parabolas whose sweeps end at `last`, of shape (chain, draw, segment)."""
-    last = np.asarray(last, dtype=float)
-    first = np.where(np.array(segments) == "forward", 1.0, -1.0) if first is None else first
-    angles = np.where(np.array(segments) == "forward", 3.2, -0.1)
-    events = {"snap_off_contact_x": last, "first_contact_x": first, "snap_off_drive_angle": angles}
-    dims = ("chain", "draw", "segment")
-    shape = last.shape[:2]
-    out = xr.DataTree.from_dict(
-        {
-            "posterior": xr.Dataset(
-                {k: (dims[:2], np.broadcast_to(v, shape)) for k, v in {"a": a, "q": q, "x_c": x_c}.items()}
-            ),
-            "events": xr.Dataset(
-                {k: (dims, np.broadcast_to(v, last.shape)) for k, v in events.items()}, coords={"segment": segments}
-            ),
-        }
+    last, is_forward = np.asarray(last, dtype=float), np.array(segments) == "forward"
+    values = {name: np.broadcast_to(v, last.shape[:2]) for name, v in {"a": a, "q": q, "x_c": x_c}.items()}
+    return touched(
+        posteriors.tree("parabola", units="SI", **values),
+        segments,
+        snap_off_contact_x=last,
+        first_contact_x=np.where(is_forward, 1.0, -1.0) if first is None else first,
+        snap_off_drive_angle=np.where(is_forward, 3.2, -0.1),
     )
-    out.attrs = {"family": "parabola", "units": units}
-    return out
 
 
 def spread(size=500):

@@ -16,7 +16,6 @@ from tactile_bayes import plotting
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior import infer_contacts
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import in_frame, record_hash
@@ -66,9 +65,6 @@ def single() -> xr.Dataset:
 
 def parameters(contour):
     return {name: [getattr(contour, name)] * 3 for name in ("a", "r", "q", "x_c") if hasattr(contour, name)}
-
-
-# --- Against scans ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -142,9 +138,6 @@ def test_inferred_friction_and_compliance_go_into_the_paths_draw_by_draw():
                 np.testing.assert_allclose(on[name], state[f"truth_{name}"], rtol=0.0, atol=1e-8)
 
 
-# --- Jointly ----------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_contact_begins_and_ends_with_the_events_of_the_same_draw():
     tree = implied_contacts(posterior())
@@ -188,34 +181,25 @@ def test_moments_are_those_of_the_draws():
     assert str(at.contact_phase.values) == "tangential"
 
 
-# --- Layout -----------------------------------------------------------------------------------------------------
-
-
 def test_the_layout_is_that_of_infer_contacts():
-    cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    single = infer_contacts(measured().isel(sample=[50]), rig=Rig(load_cell=cell), rng=1, draws=4)
+    single = infer_contacts(measured().isel(sample=[50]), rig=Rig(load_cell=CELL), rng=1, draws=4)
     tree = implied()
     assert set(tree.children) == set(single.children)
-    assert list(tree["posterior"].data_vars) == list(single["posterior"].data_vars)
-    for name in tree["posterior"].data_vars:
-        assert tree["posterior"][name].dims == single["posterior"][name].dims
-        assert tree["posterior"][name].dtype == single["posterior"][name].dtype
-        assert tree["posterior"][name].attrs == single["posterior"][name].attrs
+    ours, theirs = (
+        [(name, v.dims, v.dtype, v.attrs) for name, v in made["posterior"].data_vars.items()] for made in (tree, single)
+    )
+    assert ours == theirs
     for group in ("observed_data", "constant_data"):
         assert list(tree[group].data_vars) == list(single[group].data_vars)
     assert dict(tree["posterior"].sizes) == {"chain": 2, "draw": 100, "sample": measured().sizes["sample"]}
     assert tree.attrs["draws"] == 200
     assert tree.attrs["data_sha256"] == record_hash(measured())
-    assert " 200 contours " in tree.attrs["message"]
-    assert "; converged" in tree.attrs["message"]
+    assert all(words in tree.attrs["message"] for words in (" 200 contours ", "; converged"))
 
 
 def test_draws_are_picked_evenly():
     count = posterior()["posterior"].sizes["draw"]
     assert implied_contacts(posterior(), draws=3)["posterior"].draw.values.tolist() == [0, (count - 1) // 2, count - 1]
-
-
-# --- What is refused --------------------------------------------------------------------------------------------
 
 
 def of_another_record():
@@ -235,9 +219,6 @@ def of_another_record():
 def test_what_implies_no_contacts_is_refused(tree, draws, error, named):
     with refused(error, *named):
         implied_contacts(tree(), draws=draws)
-
-
-# --- Figure -----------------------------------------------------------------------------------------------------
 
 
 def ratios(ax):

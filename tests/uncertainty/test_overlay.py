@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
+from helpers.contour_posteriors import touched, tree
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Polyline
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -54,20 +55,8 @@ def test_a_sloping_line_is_inside_where_it_is():
 
 @pytest.fixture
 def posterior():
-    values = {"r": 0.1, "q": 0.2, "x_c": 0.0}
-    tree = xr.DataTree.from_dict(
-        {
-            "posterior": xr.Dataset({k: (("chain", "draw"), np.full((1, 9), v)) for k, v in values.items()}),
-            "events": xr.Dataset(
-                {
-                    f"{when}_contact_x": (("chain", "draw"), np.full((1, 9), x))
-                    for when, x in (("first", -0.05), ("snap_off", 0.05))
-                }
-            ),
-        }
-    )
-    tree.attrs = {"family": "circle", "units": "SI"}
-    return tree
+    flat = tree("circle", units="SI", r=np.full(9, 0.1), q=np.full(9, 0.2), x_c=np.zeros(9))
+    return touched(flat, first_contact_x=-0.05, snap_off_contact_x=0.05)
 
 
 def test_files_are_read_in_the_unit_of_the_record(posterior, tmp_path):

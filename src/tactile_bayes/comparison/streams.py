@@ -38,8 +38,8 @@ _KEPT_DRAWS = 1000  # number of draws of a contour that are in a result, of each
 class StreamComparison:
     """Posteriors of several families of contours from the record so far, with the probability of each family.
 
-    Each family has a `Stream` of its own, whose evidence gives its probability, if the contour is of one of the
-    families, with equal prior probabilities. As in `compare_families`, sizes have priors that favour no family.
+    Each family has a `Stream` of its own, whose evidence gives its probability, with prior probabilities and priors of
+    sizes that favour no family, as in `compare_families`.
 
     Parameters
     ----------
@@ -60,8 +60,7 @@ class StreamComparison:
     Notes
     -----
     A family is lost, with the probability 0 from then on, if none of its particles explains the samples, none of its
-    contours is within reach, or the logarithm of its evidence is 100 below the largest. An update takes as long as
-    those of all families that are left together.
+    contours is within reach, or the logarithm of its evidence is 100 below the largest.
 
     Examples
     --------

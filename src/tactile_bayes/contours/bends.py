@@ -90,9 +90,8 @@ def refuse_unless_convex(bends: Bends, freedom: float, place: Callable[[float], 
 def refuse_two_bands(x: Floats, y: Floats) -> None:
     """Refuse points with two heights at about the same x, like those of a closed outline.
 
-    The heights of eight neighbours are parted at their widest gap. On a convex contour the lower ones are neighbours
-    again. In more than a third of such groups upper and lower ones may not alternate, with a gap twice as wide as
-    either part; of groups that only scatter, one in 150 does so.
+    The heights of eight neighbours are parted at their widest gap. If upper and lower ones alternate, with a gap twice
+    as wide as either part, in more than a third of all groups, it is an outline; of those that scatter, 1 in 150 does.
     """
     if x.size < _FEWEST_BANDED:
         return

@@ -29,10 +29,9 @@ _SAME = 1e-9  # rounding error, as a share of a contour's size, or as an angle [
 def check(contour: Contour) -> None:
     """Refuse a contour whose formulas are inconsistent, or which is not strictly convex; it serves new families.
 
-    The check takes 400 points a contour, where it is not steeper than 1.5 rad. It compares the rates of point and slope
-    angle with their changes from point to point, and verifies the growth of the slope angle, the height, and the
-    searches for the parameter of a slope angle and of an x. It may overlook features that are much narrower than the
-    distance of the points.
+    At 400 points, where it is not steeper than 1.5 rad, the rates of point and slope angle are compared with their
+    changes from point to point, and the growth of the slope angle, the height, and the searches for the parameter of a
+    slope angle and of an x are verified. Features much narrower than the distance of the points may be overlooked.
 
     Parameters
     ----------

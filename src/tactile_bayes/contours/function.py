@@ -59,9 +59,9 @@ def from_function(
 ) -> FunctionContour:
     """Contour y = g(x).
 
-    Without derivatives the contour is g's Chebyshev interpolant, fine enough to equal g up to rounding, so that point,
-    slope and curvature are consistent; g must then be smooth on the whole domain. With derivatives the contour is g
-    itself, and its curvature must be continuous. Where the curvature jumps, join two functions: `Joined`.
+    Without derivatives the contour is g's Chebyshev interpolant, which equals g up to rounding, and g must be smooth on
+    the whole domain. With derivatives it is g itself, and its curvature must be continuous. Where the curvature jumps,
+    join two functions: `Joined`.
 
     Parameters
     ----------

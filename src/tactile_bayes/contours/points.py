@@ -81,8 +81,8 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     noise g⁗ (the smoothing spline's prior; Wahba, Ann. Statist. 13, 1985, p. 1378).
 
     First, every stretch of neighbouring points, short and long, is tested for a bend of the wrong sign: the quadratic
-    term of a parabola fitted to it, which is never negative for points of a convex contour, is compared with its
-    standard error. Points of a convex contour with Gaussian scatter are refused at most once in 1000 times.
+    term of a parabola fitted to it is compared with its standard error. Points of a convex contour with Gaussian
+    scatter are refused at most once in 1000 times.
 
     Parameters
     ----------
@@ -90,10 +90,8 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
         The points [length], in any order; the x may repeat. At least six x must differ; they are taken as exact.
     scatter : array_like, shape () or (n,), optional
         Standard deviation of the heights y [length], of all or of each, independent from point to point; give a larger
-        one where neighbouring errors are correlated, as in a filtered profile or in finely spaced, coarsely rounded
-        heights. A probe with a scatter σ normal to a contour of slope angle α has the scatter σ/cos α in height. By
-        default one scatter is estimated from the points: the more points the better, and a dent of few points counts as
-        scatter.
+        one where neighbouring errors are correlated, as in a filtered profile. A scatter σ normal to a contour of slope
+        angle α is one of σ/cos α in height. By default one is estimated: a dent of few points counts as scatter.
 
     Returns
     -------
@@ -104,8 +102,7 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     ------
     ContourError
         If the points are not convex within their scatter (the message names the stretch), form a closed outline, are
-        upside down, or cannot be distinguished from a line; if they are too few or not finite, or a scatter is not
-        positive.
+        upside down, as good as a line, too few or not finite, or a scatter is not positive.
 
     Examples
     --------
@@ -118,13 +115,6 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     from_points(60 points, x from -0.8 to 0.8, scatter 0.00177, residual_rms 0.00171)
     >>> contour.height([-0.5, 0.0, 0.5]).round(3)
     array([0.425, 0.3  , 0.425])
-
-    A dent:
-
-    >>> from_points(x, measured + 0.04 * np.exp(-((x - 0.3) ** 2) / 0.01), scatter=0.002)
-    Traceback (most recent call last):
-        ...
-    tactile_bayes.errors.ContourError: from_points: the points are not convex from x = 0.176271 to 0.420339: ...
     """
     x, y, given = _checked(x, y, scatter)
     refuse_two_bands(x, y)

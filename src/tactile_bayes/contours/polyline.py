@@ -21,7 +21,7 @@ _BEYOND = 1e-9  # share of a segment by which a foot beyond it may be rounding
 class Polyline:
     """A contour of straight segments between points, in one piece or several, as of a probe or a drawing.
 
-    An inferred contour is compared with it. Unlike other contours it cannot be swept along; see `from_points`.
+    Inferred contours are compared with it. It cannot be swept along; see `from_points`.
 
     Parameters
     ----------
@@ -30,10 +30,8 @@ class Polyline:
 
     Raises
     ------
-    ParameterError
-        If a piece does not hold pairs of finite numbers.
-    ContourError
-        If there is no piece, or one has fewer than two points.
+    ParameterError, ContourError
+        If a piece does not hold pairs of finite numbers; if there is none, or one has fewer than two points.
 
     Examples
     --------

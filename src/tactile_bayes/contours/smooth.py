@@ -29,19 +29,16 @@ _CELLS = 128
 class Smooth(Tabled):
     """Any smooth, strictly convex contour between vertical ends: log ρ(α) is a polynomial, and the vertex is given.
 
-    The contour follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle. It is
-    strictly convex for all values. Unlike `ShapeFree` it is smooth everywhere, so that many contours at once cost
-    little.
+    The contour follows by integration, as that of `ShapeFree`; its own parameter is the slope angle. It is strictly
+    convex for all values, and smooth everywhere, so that many contours at once cost little.
 
     Parameters
     ----------
     log_radius : array_like, shape (..., k)
         Logarithm of the radius of curvature, in the unit of length of q and x_c, at the interpolation nodes
         `Smooth.nodes(k)`; k ≥ 2.
-    q : array_like, shape (...)
-        Height of the vertex [length].
-    x_c : array_like, shape (...)
-        Position of the vertex [length].
+    q, x_c : array_like, shape (...)
+        Height and position of the vertex [length].
 
     Raises
     ------
@@ -129,10 +126,9 @@ class Smooth(Tabled):
 
 
 def _tabulated(coefficients: Floats) -> Floats:
-    """Table at the ends of cells, shape (n, cells + 1, 6), from coefficients of log ρ, shape (k, n).
+    """Table at the ends of cells, (n, cells + 1, 6), as in `Halves`, from coefficients of log ρ, (k, n).
 
-    Columns are the point relative to the vertex, its rates over a cell, and the rates of these. The integral over a
-    cell has an error of seventh order in its width.
+    The integral over a cell has an error of seventh order in its width.
     """
     alpha, values, slopes = _grid(coefficients.shape[0])
     log_radius = coefficients.T @ values

@@ -16,9 +16,8 @@ _FAR = 1e3  # rod lengths beyond which an end of a contour does not matter
 class SweepFrame:
     """A batch of n contours of one family, each in the frame of a sweep with its own pivot.
 
-    The rod's centreline stays `standoff` (half the rod's diameter) outside the object: it traces the parallel curve,
-    which is strictly convex too. In this frame all sweeps are forward ones. Lengths are in the contour's unit, and what
-    is not an array of shape (n,) holds for all contours.
+    The rod's centreline traces the parallel curve at `standoff`, half the rod's diameter. In this frame all sweeps are
+    forward ones. Lengths are in the contour's unit, and what is not an array of shape (n,) holds for all contours.
     """
 
     contour: Contour  # contours whose parameters are all arrays of shape (n,)
@@ -63,11 +62,8 @@ class SweepFrame:
         )
 
     def domain(self) -> tuple[Floats, Floats]:
-        """Least and greatest parameter of every contour, shape (n,).
-
-        Where a contour has no end, or one so far away that rounding hides its direction, it is cut just beyond the
-        rod's reach.
-        """
+        """Least and greatest parameter of every contour, shape (n,); an end that is absent, or so far that rounding
+        hides its direction, is put just beyond the rod's reach."""
         lo, hi = (np.broadcast_to(end, (self.size,)).astype(float) for end in self.contour.domain)
         lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
         size, ends = np.arange(self.size), np.broadcast_to(1.0 + np.asarray(self.stem) + self.way, (self.size,))

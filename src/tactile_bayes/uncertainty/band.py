@@ -196,7 +196,7 @@ def _aligned_heights(posterior: xr.DataTree, x: Floats, align: str) -> Floats:
     reference = most_central(contours, x)
     feet, moves = feet_of(reference, x), _moves_onto(reference, contours, posterior, x, align)
     if align == "translation":
-        return heights_of(contours, x - moves.shift[0][:, None]) + moves.shift[1][:, None]
+        return heights_of(contours, x - moves.shift.real[:, None]) + moves.shift.imag[:, None]
     return feet.y + normal_offsets(contours, feet._replace(slope_angle=np.zeros_like(x)), moves)
 
 

@@ -89,7 +89,7 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     ParameterError
         If the probability is not in (0, 1), or there is no such sample.
     InferenceError
-        If the argument is not a result of `infer_contacts` or `implied_contacts`, or the sample has no contact.
+        If this is no result of `infer_contacts` or `implied_contacts`, or the sample has no contact.
 
     Examples
     --------

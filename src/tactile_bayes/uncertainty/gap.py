@@ -67,10 +67,9 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     Notes
     -----
     With several pivots, or a base that is carried, a gap is an arc that no sweep has touched, after the arcs from first
-    contact to snap-off are merged; its ends may then be first contacts, and several gaps may remain. The widest is
-    described: medians decide which arcs lie on its left and which on its right, and each contour's gap lies between the
-    rightmost end of the former and the leftmost end of the latter. If no gap remains, the smallest overlap is
-    described.
+    contact to snap-off are merged; its ends may then be first contacts. Of several gaps the widest is described, and if
+    none remains, the smallest overlap: medians decide which arcs lie on its left and which on its right, and each
+    contour's gap lies between the rightmost end of the former and the leftmost end of the latter.
 
     Where a contour's own arcs reach beyond the gap's ends, its height is known by contact, and counts as a triangle of
     no width: the band is between triangle_lower and triangle_upper, up to the noise of the draws.

@@ -31,6 +31,10 @@ _OF_RUN = ("sampler", "seed", "settings", "data_sha256", "converged", "approxima
 _OF_MODEL = ("family", "friction", "nuisances", "priors")
 # Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw.
 _ANGLE_UNKNOWNS = ("drive_angle_offset", "backlash", "suspension_compliance")
+_ATTRIBUTES = {
+    "drive_angle": {"units": "rad", "long_name": "drive angle"},
+    "tangential": {"units": "1", "long_name": "whether the contact is tangential"},
+}
 _DIMS = ("chain", "draw", "sample")
 
 
@@ -83,15 +87,19 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     # `infer_contour` picks the draws of which it keeps events and predictions by the same rule.
     picked = every.isel(draw=evenly_spread(every.sizes["draw"], draws))
     variables = _implied(posterior, record, picked)
-    touched = np.isfinite(variables["tangential"]).sum(axis=(0, 1))
-    tangential, number = np.nansum(variables["tangential"], axis=(0, 1)), picked.sizes["chain"] * picked.sizes["draw"]
+    tangential = variables["tangential"]
+    number, touched = picked.sizes["chain"] * picked.sizes["draw"], np.isfinite(tangential).sum(axis=(0, 1))
+    share = np.nansum(tangential, axis=(0, 1)) / np.where(touched, touched, np.nan)
     stats = {
         "contact_probability": ("sample", touched / number, {"units": "1"}),
-        "tangential_probability": ("sample", tangential / np.where(touched, touched, np.nan), {"units": "1"}),
+        "tangential_probability": ("sample", share, {"units": "1"}),
     }
     units, sample = record.attrs["units"], np.arange(record.sizes["sample"])
     coords = {"chain": picked["chain"].values, "draw": picked["draw"].values, "sample": sample}
-    labelled = {name: (_DIMS, values, _attributes(name, units)) for name, values in variables.items()}
+    labelled = {
+        name: (_DIMS, values, _ATTRIBUTES.get(name) or column_attributes(name, units))
+        for name, values in variables.items()
+    }
     tree = xr.DataTree.from_dict(
         {
             "posterior": xr.Dataset(labelled, coords=coords),
@@ -165,11 +173,3 @@ def contacts_of(
     for name, values in out.items():
         values[batch_index % count, samples[batch_index // count, rank]] = columns[name]
     return out
-
-
-def _attributes(name: str, units: str) -> dict[str, str]:
-    if name == "tangential":
-        return {"units": "1", "long_name": "whether the contact is tangential"}
-    if name == "drive_angle":
-        return {"units": "rad", "long_name": "drive angle"}
-    return column_attributes(name, units)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_choice
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.base import Locus
@@ -38,32 +39,17 @@ class Feet(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """A move of each of n contours: turned by an angle about a point, scaled from it, shifted."""
+    """A similarity of each of n contours, in the complex plane: z → about + factor (z − about) + shift."""
 
-    about: tuple[float, float]
-    shift: Floats  # (2, n)
-    turn: Floats  # (n,) [rad]
-    scale: Floats  # (n,)
+    about: complex
+    shift: NDArray[np.complex128]
+    factor: NDArray[np.complex128]
 
     def undone(self, feet: Feet | Locus) -> Feet:
         """Return the feet as each contour has them before its move; shape (n, k)."""
-        x = (feet.x - self.about[0] - self.shift[0][:, None]) / self.scale[:, None]
-        y = (feet.y - self.about[1] - self.shift[1][:, None]) / self.scale[:, None]
-        cos, sin = np.cos(self.turn)[:, None], np.sin(self.turn)[:, None]
-        back_x, back_y = self.about[0] + cos * x + sin * y, self.about[1] - sin * x + cos * y
-        return Feet(back_x, back_y, feet.slope_angle - self.turn[:, None])
-
-    def where(self, kept: Flags, others: Moves) -> Moves:
-        """Return these moves of the contours that are kept, and others of the others."""
-        values = zip(self[1:], others[1:], strict=True)
-        return Moves(self.about, *(np.where(kept, own, other) for own, other in values))
-
-    def then(self, shift: Floats, turn: Floats, growth: Floats) -> Moves:
-        """Return these moves followed by small ones about the same point."""
-        cos, sin = (1.0 + growth) * np.cos(turn), (1.0 + growth) * np.sin(turn)
-        x, y = self.shift
-        turned = np.stack([cos * x - sin * y, sin * x + cos * y])
-        return Moves(self.about, turned + shift, self.turn + turn, self.scale * (1.0 + growth))
+        moved = feet.x + 1j * feet.y - self.about - self.shift[:, None]
+        place = self.about + moved / self.factor[:, None]
+        return Feet(place.real, place.imag, feet.slope_angle - np.angle(self.factor)[:, None])
 
 
 def feet_of(contour: Contour, x: Floats) -> Feet:
@@ -99,10 +85,10 @@ def aligned(contours: Contour, feet: Feet, alignment: str) -> Moves:
     feet = Feet(feet.x[some], feet.y[some], feet.slope_angle[some])
     count = contours.shape[0]
     there = np.isfinite(feet.x)
-    about = (float(np.mean(feet.x[there])), float(np.mean(feet.y[there]))) if there.any() else (0.0, 0.0)
-    moves = Moves(about, np.zeros((2, count)), np.zeros(count), np.ones(count))
+    about = complex(np.mean(feet.x[there]), np.mean(feet.y[there])) if there.any() else 0j
+    moves = Moves(about, np.zeros(count, dtype=complex), np.ones(count, dtype=complex))
     sin, cos = np.sin(feet.slope_angle), np.cos(feet.slope_angle)
-    x, y = feet.x - about[0], feet.y - about[1]
+    x, y = feet.x - about.real, feet.y - about.imag
     # A turn and a growth count as they move the feet.
     size = (float(np.sqrt(np.nanmean(x**2 + y**2))) if there.any() else 0.0) or 1.0
     effects = np.stack([-sin, cos, (sin * y + cos * x) / size, (cos * y - sin * x) / size])[: ALIGNMENTS[alignment]]
@@ -121,10 +107,13 @@ def _nearer(contours: Contour, feet: Feet, moves: Moves, effects: Floats, size: 
     steps[2:] /= size
     best, least = moves, np.sum(offsets[:, met] ** 2, axis=1)
     for share in _SHARES:
-        tried = moves.then(share * steps[:2], share * steps[2], share * steps[3])
+        shift_x, shift_y, turn, growth = share * steps
+        factor = (1.0 + growth) * np.exp(1j * turn)
+        tried = Moves(moves.about, factor * moves.shift + shift_x + 1j * shift_y, factor * moves.factor)
         total = np.sum(normal_offsets(contours, feet, tried)[:, met] ** 2, axis=1)
         better = total < least  # not where a normal no longer meets its contour
-        best, least = best.where(~better, tried), np.where(better, total, least)
+        best = Moves(moves.about, *(np.where(better, new, old) for new, old in zip(tried[1:], best[1:], strict=True)))
+        least = np.where(better, total, least)
         if better.all():
             break
     return best
@@ -146,7 +135,7 @@ def normal_offsets(contours: Contour, feet: Feet | Locus, moves: Moves | None = 
         many = contours.take(np.repeat(row, given.size))
         ours = [values[row[:, None], given].ravel() for values in each]
         offsets[row[:, None], given] = _offsets(many, *ours).reshape(row.size, given.size)
-    return offsets if moves is None else offsets * moves.scale[:, None]
+    return offsets if moves is None else offsets * np.abs(moves.factor)[:, None]
 
 
 def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
