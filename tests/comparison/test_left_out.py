@@ -22,16 +22,6 @@ def problem_of(cell=CELL):
     return contour_problem(Experiment(measured, Rig(load_cell=cell, unknown="nothing"), "parabola"))
 
 
-@pytest.fixture(scope="module")
-def problem():
-    return problem_of()
-
-
-@pytest.fixture(scope="module")
-def predicted(problem):
-    return predicted_samples(problem, sampled(problem, seed=1, settings=SETTINGS), seed=2, settings=SETTINGS)
-
-
 def inferred_without(problem, sample):
     """Its log-density from a posterior of all the others, and the error of that."""
     model = problem.model
@@ -46,11 +36,13 @@ def inferred_without(problem, sample):
 
 
 @pytest.mark.slow
-def test_samples_are_predicted_as_if_inferred_without_them(problem, predicted):
+def test_samples_are_predicted_as_if_inferred_without_them():
     """At an event, where importance sampling from the posterior is off, and elsewhere, where it is what is done.
 
     Three times the error for autocorrelation.
     """
+    problem = problem_of()
+    predicted = predicted_samples(problem, sampled(problem, seed=1, settings=SETTINGS), seed=2, settings=SETTINGS)
     events = problem.model.likelihood.segments.event_samples(problem.loaded)
     at_event, elsewhere = int(events[0, 3]), int(events[0, 1]) + 5
     assert np.isnan(predicted.pareto_k[at_event])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
+from scipy.spatial.distance import cdist
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.checks import check_probability, check_whole_number
@@ -14,8 +15,6 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import contact_draws
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.uncertainty.contact_moments import LEAST_DRAWS
-
-_BLOCK = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +29,8 @@ class ContactRegion:
     probability: float
     draws: Floats  # contact points, shape (n, 2), in the record's unit of length
     level: float  # density on the boundary, in arbitrary units; see `density`
-    _of_draws: Floats
-    _white: Floats
-    _to_white: Floats
-    _centre: Floats
-    _bandwidth: float
+    _of_draws: Floats  # densities at the draws, increasing
+    _scaling: Floats  # makes the kernel a unit normal one
 
     def __repr__(self) -> str:
         return f"ContactRegion(probability={self.probability:g}, {len(self.draws)} draws)"
@@ -42,8 +38,8 @@ class ContactRegion:
     def density(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the density at points, in the units of `level`; the shape is that of x and y, broadcast."""
         x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        at = (np.stack([x.ravel(), y.ravel()], axis=-1) - self._centre) @ self._to_white.T
-        return _kernel_sums(at, self._white, self._bandwidth).reshape(x.shape) / len(self._white)
+        at = np.stack([x.ravel(), y.ravel()], axis=-1) @ self._scaling
+        return _kernel_sums(at, self.draws @ self._scaling).reshape(x.shape) / len(self.draws)
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> Flags:
         """Return True for points in the region, False for others and for NaN; shape as of x and y, broadcast."""
@@ -60,7 +56,7 @@ class ContactRegion:
 
     def grid(self, points: int = 80) -> tuple[Floats, Floats, Floats]:
         """Return x, y and density on a grid over the region, shapes (points,), (points,) and (points, points)."""
-        margin = 3.0 * self._bandwidth * self.draws.std(axis=0)
+        margin = 3.0 * len(self.draws) ** (-1.0 / 6.0) * self.draws.std(axis=0)
         low, high = self.draws.min(axis=0) - margin, self.draws.max(axis=0) + margin
         x, y = (np.linspace(low[i], high[i], points) for i in (0, 1))
         return x, y, self.density(*np.meshgrid(x, y))
@@ -110,22 +106,14 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < LEAST_DRAWS:
         raise InferenceError(f"sample {sample} has no contact: its posterior has no draws")
-    centre = points.mean(axis=0)
     variances, axes = np.linalg.eigh(np.cov(points.T))
-    to_white = (axes / np.sqrt(np.maximum(variances, 1e-30))).T
-    white = (points - centre) @ to_white.T
-    bandwidth = len(points) ** (-1.0 / 6.0)
-    others = np.sort((_kernel_sums(white, white, bandwidth) - 1.0) / (len(points) - 1))
-    level = float(np.quantile(others, 1.0 - probability))
-    return ContactRegion(probability, points, level, others, white, to_white, centre, bandwidth)
+    scaling = axes / np.sqrt(np.maximum(variances, 1e-30)) * len(points) ** (1.0 / 6.0)
+    scaled = points @ scaling
+    others = np.sort((_kernel_sums(scaled, scaled) - 1.0) / (len(points) - 1))
+    return ContactRegion(probability, points, float(np.quantile(others, 1.0 - probability)), others, scaling)
 
 
-def _kernel_sums(at: Floats, centres: Floats, bandwidth: float) -> Floats:
-    """Return the sum of the kernels around centres (n, 2) at points (m, 2); a kernel is 1 at its centre."""
-    sums = np.empty(len(at))
-    squares = (centres * centres).sum(axis=1)
-    for block in blocks(len(at), len(centres), max(1, _BLOCK // len(centres))):
-        part = at[block]
-        distance = (part * part).sum(axis=1)[:, None] + squares - 2.0 * (part @ centres.T)
-        sums[block] = np.exp(-0.5 / bandwidth**2 * np.maximum(distance, 0.0)).sum(axis=1)
-    return sums
+def _kernel_sums(at: Floats, centres: Floats) -> Floats:
+    """Return the sum of unit normal kernels around centres (n, 2) at points (m, 2); a kernel is 1 at its centre."""
+    parts = blocks(len(at), len(centres))
+    return np.concatenate([np.exp(-0.5 * cdist(at[part], centres, "sqeuclidean")).sum(axis=1) for part in parts])
