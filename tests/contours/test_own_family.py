@@ -133,7 +133,7 @@ WRONG = {
     ),
     "other contours": (
         graph(*PARABOLA, broadcast_to=lambda self, shape: type(self)(np.full(shape, 0.4))),
-        r"broadcast_to .* y = ",
+        r"broadcast_to .* at x = ",
     ),
 }
 

@@ -98,12 +98,12 @@ class StreamComparison:
     @property
     def record(self) -> xr.Dataset | None:
         """The record so far; None before the first update."""
-        return self._known_record() if self._streams else None
+        return self._streams[self._left()[0]].record if self._streams else None
 
     def _known_record(self) -> xr.Dataset:
-        if not self._streams:
+        if (record := self.record) is None:
             raise InferenceError("the streams have no samples yet: call update with some first")
-        return cast(xr.Dataset, self._streams[self._left()[0]].record)
+        return record
 
     def update(self, samples: xr.Dataset) -> xr.Dataset:
         """Take new samples into account, as `Stream.update` does, and return the families' probabilities.
@@ -114,16 +114,13 @@ class StreamComparison:
             Over "family": `probability`; `log_evidence`; `effective_number`, `correlation`, `log_density_shift` and
             `e_value`, as from `Stream.update` (NaN for a family that is lost; where the shift is above 1.2, evidence
             and probability of the family are too small); `contour_draws`, of which `contour_band` computes a band
-            averaged over families. `samples`, their number so far; `seconds` that the update took;
-            with x, `height` by `level` and `x`, averaged over families; with a rule, `may_stop`. Attributes:
-            `most_probable`; `lost`, messages by family (JSON).
+            averaged over families. `samples`, their number so far; `seconds` that the update took; with x, `height` by
+            `level` and `x`, averaged over families; with a rule, `may_stop`. Attributes: `most_probable`; `lost`, JSON.
 
         Raises
         ------
-        RecordError, ParameterError
-            As in `Stream.update`.
-        InferenceError
-            If no family explains the samples. After any error all streams are as before.
+        RecordError, ParameterError, InferenceError
+            As in `Stream.update`, and if no family explains the samples. After any error all streams are as before.
         """
         began = perf_counter()
         before = self._streams, self._lost
@@ -194,12 +191,7 @@ class StreamComparison:
     def posterior(self, family: str | None = None) -> xr.DataTree:
         """Return the posterior of a family, by default of the most probable one, as `Stream.posterior` does.
 
-        Raises
-        ------
-        InferenceError
-            Before the first update, or if the family is lost.
-        ParameterError
-            If the family is not one of those compared.
+        Raises InferenceError before the first update or if the family is lost, ParameterError if it is not compared.
         """
         self._known_record()
         name = str(self.latest().attrs["most_probable"]) if family is None else family_named(family).name

@@ -236,9 +236,8 @@ def check_single(name: str, value: Any, correction: str = "give one contour, suc
 class Graph(Contour):
     """A contour given as the graph y = g(x), with the parameter x.
 
-    A new family is a frozen dataclass of its parameters, with a method for g and its first two derivatives.
-    It overrides `domain` if it has ends; `check` verifies it. Parameters may be arrays, so that formulas must work on
-    arrays. A contour without parameters derives from `Graph` and `Single`.
+    A new family is a frozen dataclass of its parameters, with a method for g and its first two derivatives, whose
+    formulas work on arrays. A contour without parameters derives from `Graph` and `Single`.
 
     Examples
     --------

@@ -60,10 +60,9 @@ def check(contour: Contour) -> None:
     if not isinstance(contour, Contour):
         raise ContourError(f"{contour!r} is no contour: give one, such as Parabola(0.5, 0.3)")
     try:
-        places = check_shape(contour)[::_FEW]
+        places = check_shape(contour)
         with np.errstate(all="ignore"):
-            _Checked(contour).refuse_picking(places)
-            _Checked(contour).refuse_searches(places)
+            _Checked(contour).refuse_searches(places[::_FEW])
     except ContourError:
         raise
     except (TypeError, ValueError, IndexError) as error:
@@ -208,13 +207,17 @@ class _Checked:
             raise self._refusal(tuple(index), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
 
     def refuse_searches(self, stops: Floats) -> None:
-        contour, locus = self.contour, self._located(stops)
-        size = np.abs(locus.x).max(axis=0) + np.abs(locus.y).max(axis=0)
+        """Refuse contours that are elsewhere when picked, or whose searches find other points."""
+        contour, locus, shape = self.contour, self._located(stops), self.shape or (1,)
+        picked = contour.broadcast_to(shape).take(tuple(axis.ravel() for axis in np.indices(shape)))
+        rows = stops.reshape(len(stops), -1)
+        y = np.broadcast_to(picked.locate(rows).y, rows.shape).reshape(stops.shape)
         x = contour.locate(contour.parameter_of_x(locus.x)).x
         angle = contour.locate(contour.parameter_of_slope(locus.slope_angle)).slope_angle
-        steepness = 1.0 + np.abs(np.tan(locus.slope_angle))
+        size = np.abs(locus.x).max(axis=0) + np.abs(locus.y).max(axis=0)
         for name, found, wanted, rounding in (
-            ("the height at x", contour.height(locus.x), locus.y, size * steepness),
+            ("y, picked by broadcast_to and take,", y, locus.y, size),
+            ("the height at x", contour.height(locus.x), locus.y, size * (1.0 + np.abs(np.tan(locus.slope_angle)))),
             ("the x that parameter_of_x finds", x, locus.x, size),
             ("the slope angle that parameter_of_slope finds", angle, locus.slope_angle, 1.0),
         ):
@@ -225,18 +228,6 @@ class _Checked:
                     f"{name} is {np.broadcast_to(found, stops.shape)[bad][0]:.6g} at x = "
                     f"{_text(locus.x[at, *index])}, not {wanted[bad][0]:.6g}",
                 )
-
-    def refuse_picking(self, stops: Floats) -> None:
-        """Refuse contours for which `broadcast_to` and `take` give other points."""
-        shape = self.shape or (1,)
-        index = tuple(axis.ravel() for axis in np.indices(shape))
-        picked = self.contour.broadcast_to(shape).take(index)
-        y = self._located(stops).y.reshape(len(stops), -1)
-        found = np.broadcast_to(picked.locate(stops.reshape(y.shape)).y, y.shape)
-        if np.any(bad := ~(np.abs(found - y) <= _SAME * np.abs(y).max())):
-            raise self._refusal(
-                (), f"picked by broadcast_to and take it is at y = {found[bad][0]:.6g}, not {y[bad][0]:.6g}"
-            )
 
 
 def _first(bad: ArrayLike) -> BatchIndex:

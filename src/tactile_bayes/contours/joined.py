@@ -27,7 +27,7 @@ class Joined(Contour):
     Parameters
     ----------
     left, right : Contour
-        The halves; they meet at the joint.
+        The halves, which meet at the joint.
     x : array_like, optional
         Position of the joint [length]; broadcasts with the halves. By default the point at which both are level.
 

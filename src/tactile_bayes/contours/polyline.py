@@ -54,18 +54,18 @@ class Polyline:
 
     def distance(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the distance of each point from the nearest one of the polyline; NaN where that is a free end."""
-        points = np.stack(np.broadcast_arrays(*check_arrays(x=x, y=y)), axis=-1)
+        return np.asarray(np.vectorize(self._distance_of, otypes=[float])(*check_arrays(x=x, y=y)))
+
+    def _distance_of(self, x: float, y: float) -> float:
+        if not np.isfinite([x, y]).all():
+            return np.nan
         starts, along, free = self._segments
-        squares = np.sum(along**2, axis=1)
-        found = np.full(points.shape[:-1], np.nan)
-        for at in np.ndindex(found.shape):
-            off = points[at] - starts
-            share = np.sum(off * along, axis=1) / squares
-            beyond = np.stack([share < -_BEYOND, share > 1.0 + _BEYOND], axis=1) & free
-            away = np.hypot(*(off - np.clip(share, 0.0, 1.0)[:, None] * along).T)
-            if np.isfinite(points[at]).all() and not beyond[nearest := int(np.argmin(away))].any():
-                found[at] = away[nearest]
-        return found
+        off = np.array([x, y]) - starts
+        share = np.sum(off * along, axis=1) / np.sum(along**2, axis=1)
+        away = np.hypot(*(off - np.clip(share, 0.0, 1.0)[:, None] * along).T)
+        nearest = int(np.argmin(away))
+        beyond = np.array([share[nearest] < -_BEYOND, share[nearest] > 1.0 + _BEYOND]) & free[nearest]
+        return np.nan if beyond.any() else float(away[nearest])
 
     def height(self, x: ArrayLike, near: ArrayLike) -> Floats:
         """Return y of the polyline at each x, where it has several the one nearest to a height; NaN where it has none.
@@ -75,15 +75,19 @@ class Polyline:
         >>> Polyline([[(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]]).height([0.5, 0.5, 2.0], [0.4, 0.6, 0.0])
         array([ 0.,  1., nan])
         """
-        positions, heights = np.broadcast_arrays(*check_arrays(x=x, near=near))
+        return np.asarray(np.vectorize(self._height_at, otypes=[float])(*check_arrays(x=x, near=near)))
+
+    def _height_at(self, x: float, near: float) -> float:
         starts, along, _ = self._segments
-        left, right = (edge(starts[:, 0], starts[:, 0] + along[:, 0]) for edge in (np.minimum, np.maximum))
-        found = np.full(positions.shape, np.nan)
-        for at in np.ndindex(found.shape):
-            over = (left <= positions[at]) & (positions[at] <= right)
-            if over.any() and np.isfinite(heights[at]):
-                found[at] = _nearest_height(starts[over], along[over], float(positions[at]), float(heights[at]))
-        return found
+        (left, low), right = starts.T, starts[:, 0] + along[:, 0]
+        over = (np.minimum(left, right) <= x) & (x <= np.maximum(left, right))
+        if not over.any() or not np.isfinite(near):
+            return np.nan
+        # A vertical segment has all of its own heights.
+        low, (run, rise) = low[over], along[over].T
+        share = np.where(run == 0.0, near - low, x - left[over]) / np.where(run == 0.0, rise, run)
+        heights = low + np.clip(share, 0.0, 1.0) * rise
+        return float(heights[np.argmin(np.abs(heights - near))])
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -102,11 +106,3 @@ class Polyline:
             along.append(np.diff(kept, axis=0))
             free.append(open_ends)
         return np.concatenate(starts), np.concatenate(along), np.concatenate(free)
-
-
-def _nearest_height(starts: Floats, along: Floats, x: float, near: float) -> float:
-    """Return the height of segments over x that is nearest to a given one; a vertical segment has all of its own."""
-    steep = along[:, 0] == 0.0
-    share = np.where(steep, near - starts[:, 1], x - starts[:, 0]) / np.where(steep, along[:, 1], along[:, 0])
-    heights = np.asarray(starts[:, 1] + np.clip(share, 0.0, 1.0) * along[:, 1])
-    return float(np.take(heights, np.argmin(np.abs(heights - near))))

@@ -21,9 +21,8 @@ _STEEPEST = 1e300  # greatest factor a that follows from a width, to avoid overf
 class PowerLaw(Vertexed):
     """Power law y = a |x − x_c|ⁿ + q.
 
-    For n > 2 the curvature vanishes at the vertex, and only there. For n < 2 it is infinite there: the radius of
-    curvature is zero at the vertex, but the slope is continuous, and a rod slides past it. Toward n = 1 the vertex
-    becomes an edge; instead of n < 1.1 give an edge by `Joined`.
+    For n > 2 the curvature vanishes at the vertex, and only there. For n < 2 it is infinite there, but the slope is
+    continuous, and a rod slides past it. Toward n = 1 the vertex becomes an edge, which `Joined` gives.
 
     Parameters
     ----------

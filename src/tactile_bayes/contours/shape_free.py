@@ -23,8 +23,7 @@ _ORDER = 32  # Chebyshev nodes between two knots; the error is rounding even if 
 class ShapeFree(Tabled):
     """Any strictly convex contour of finite curvature: log ρ(α) is a cubic spline, and one point is given.
 
-    The contour follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle. It is
-    strictly convex for all values.
+    It follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle.
 
     Parameters
     ----------
@@ -40,8 +39,7 @@ class ShapeFree(Tabled):
     Raises
     ------
     ContourError
-        If the knots are not increasing angles, there is not one value for each knot, a value is not finite, or the
-        spline overshoots between knots that nearly coincide.
+        If the knots are not increasing angles with a finite value each, or the spline overshoots between them.
 
     Examples
     --------

@@ -61,11 +61,9 @@ def contour_band(
 
     Raises
     ------
-    ParameterError
+    ParameterError, InferenceError
         If the probability is not in (0, 1), x is not a list of finite numbers, or the alignment is unknown, or asked of
-        an average over families.
-    InferenceError
-        If families are to be averaged of which none fits the record, or that have no weights.
+        an average over families; if families are to be averaged of which none fits the record, or without weights.
 
     See Also
     --------
@@ -120,8 +118,7 @@ def normal_band(
         As in `contour_band`: if True, the probability holds at all normals at once.
     reference : Contour, optional
         By default the most central draw: the one with the smallest sum of distances between its heights at these x and
-        their medians. A pointwise median need not be convex, and the most probable draw may lie at the edge of a
-        narrow ridge.
+        their medians, since a pointwise median need not be convex.
     align : {"translation", "rigid", "similarity"}, optional
         As in `contour_band`, onto this reference: the band of the shape alone.
 

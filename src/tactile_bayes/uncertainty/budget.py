@@ -66,8 +66,7 @@ def uncertainty_budget(posterior: xr.DataTree, probability: float = 0.95) -> xr.
     draws = contour_draws(posterior)
     family = family_named(posterior.attrs["family"])
     over = ("chain", "draw")
-    of_contour = {*family.parameters, *family.roughness}
-    names = [str(name) for name, v in draws.items() if set(v.dims) == set(over) and name not in of_contour]
+    names = [str(name) for name, v in draws.items() if set(v.dims) == set(over) and name not in family.parameters]
     every = evenly_spread(draws.sizes["chain"] * draws.sizes["draw"], _DRAWS)
     drawn = {name: draws[name].transpose(*over).values.ravel()[every] for name in names}
     drawn = {name: (each - each.mean()) / each.std() for name, each in drawn.items() if np.ptp(each) > 0.0}

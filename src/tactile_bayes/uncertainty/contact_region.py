@@ -82,10 +82,9 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
 
     Raises
     ------
-    ParameterError
-        If the probability is not in (0, 1), or there is no such sample.
-    InferenceError
-        If this is no result of `infer_contacts` or `implied_contacts`, or the sample has no contact.
+    ParameterError, InferenceError
+        If the probability is not in (0, 1), or there is no such sample; if the sample has no contact, or this is no
+        result of `infer_contacts` or `implied_contacts`.
 
     Examples
     --------

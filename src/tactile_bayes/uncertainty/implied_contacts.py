@@ -64,10 +64,8 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
 
     Raises
     ------
-    InferenceError
-        If the argument is not a result of `infer_contour`, or its record is not the one that it was inferred from.
-    ParameterError
-        If `draws` is not a whole number from 1 up.
+    InferenceError, ParameterError
+        If this is no result of `infer_contour`, or its record is another one; if `draws` is no whole number from 1 up.
 
     Examples
     --------

@@ -86,10 +86,8 @@ def read_overlay(path: str | os.PathLike[str], posterior: xr.DataTree, probabili
 
     Raises
     ------
-    ParameterError
-        If the file holds no points, or they have another kind of unit than the record.
-    InferenceError
-        If the folder holds no run.
+    ParameterError, InferenceError
+        If the file holds no points, or in another kind of unit than the record; if the folder holds no run.
     """
     given = check_path("path", path, "give the folder of a run, or a file, like 'points.csv' or 'part.dxf'")
     check_probability("probability", probability)
