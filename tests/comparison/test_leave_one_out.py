@@ -209,15 +209,6 @@ def test_one_draw_does_not_pass_for_many():
     assert left_out_from_wider(logs, 1)[1] == np.inf
 
 
-def test_stacking_is_the_best_point_of_a_grid():
-    rng = np.random.default_rng(0)
-    logs = rng.normal(size=(3, 60)) + rng.normal(size=(3, 1)) * 0.3
-    steps = np.linspace(0.0, 1.0, 101)
-    grid = np.array([(a, b, 1.0 - a - b) for a in steps for b in steps if a + b <= 1.0 + 1e-9])
-    score = np.log(grid @ np.exp(logs)).sum(axis=-1)
-    assert np.abs(stacking_weights(logs) - grid[np.argmax(score)]).max() < 0.02
-
-
 @pytest.mark.parametrize("models", [1, 2, 5, 8])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 30.0, 1000.0])
 def test_no_model_would_better_a_stack(models, size):

@@ -102,7 +102,7 @@ def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
     for changed in ({"families": FAMILIES[1:]}, {"families": FAMILIES[:2], "rng": 2}):
         with pytest.raises(InferenceError):
             tb.comparison.StreamComparison.resume(tmp_path / "streams.nc", **(options | changed))
-    with pytest.raises(InferenceError, match=r"streams\.nc"):
+    with refused(InferenceError, "streams.nc"):
         tb.Stream.resume(tmp_path / "streams.nc", **options)
 
 
@@ -119,10 +119,8 @@ def test_families_of_which_something_is_said(measured):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        ({"families": ["circle"]}, ["circle"]),
         ({"families": "circle"}, ["'circle'"]),
         ({"families": FAMILIES, "rig": "good"}, ["rig", "'good'"]),
-        ({"families": ["circle", tb.Family("circle", r=0.4)]}, ["circle", "different"]),
         ({"families": FAMILIES, "particles": 3}, ["particles", "3"]),
     ],
 )

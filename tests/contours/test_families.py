@@ -18,10 +18,6 @@ CASES = {
 }
 
 
-def test_any_two_flanks_make_a_family():
-    assert set(FAMILIES) == {*FLANKS, "shape-free", *(f"{left}/{right}" for left in FLANKS for right in FLANKS)}
-
-
 def test_an_unknown_family_is_refused_with_those_that_there_are():
     with refused(ParameterError, "'blob'", "parabola"):
         family_named("blob")

@@ -32,8 +32,8 @@ from tactile_bayes.errors import ContourError
 @pytest.mark.parametrize("n", [1.85, 1.9, 1.99])
 def test_a_vertex_that_is_almost_an_ordinary_one_is_right(n):
     """There the rate of the parameter rises like a small power, which is as steep as a jump."""
-    power = PowerLaw(1.0, n, 0.5)
-    for contour in (power, Joined(power, power), Joined(power, Parabola(1.0, 0.5)), Joined(Parabola(1.0, 0.5), power)):
+    power, parabola = PowerLaw(1.0, n, 0.5), Parabola(1.0, 0.5)
+    for contour in (power, Joined(power, power), Joined(power, parabola), Joined(parabola, power)):
         check(contour)
 
 

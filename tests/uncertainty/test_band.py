@@ -9,8 +9,7 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.uncertainty.band import contour_band, contour_heights, contours_drawn, normal_band
+from tactile_bayes.uncertainty.band import contour_band, contour_heights, normal_band
 from tactile_bayes.uncertainty.offsets import Feet, aligned, normal_offsets
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
@@ -83,14 +82,6 @@ def test_beyond_the_end_of_some_circles_the_band_is_not_known():
             assert np.isfinite(band[name]).values.tolist() == [True, True, False, False, False]
         reasons = ["ok"] * 2 + ["some contours end before"] * 2 + ["all contours end before"]
         assert band.status.values.tolist() == reasons
-
-
-def test_many_draws_are_thinned_evenly():
-    drawn = made()
-    every = contours_of(drawn["posterior"].to_dataset(), "parabola")
-    picked = every.take(np.linspace(0, every.shape[0] - 1, 10).astype(int))
-    assert contours_drawn(drawn, 10) == picked
-    np.testing.assert_array_equal(contour_heights(drawn, X, most=10), picked.take(np.arange(10)[:, None]).height(X))
 
 
 def spread(family, size=200, share=0.02):

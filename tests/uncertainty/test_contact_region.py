@@ -131,18 +131,6 @@ def test_the_least_probability_is_that_of_the_region_on_whose_boundary_a_place_i
     assert np.isnan(contact_region(posterior(points), 3).least_probability(np.nan, 0.0))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SHAPES)
-def test_least_probabilities_of_fresh_points_are_uniform(name):
-    """Mean 1/2 within four standard errors of the scatter of regions, and the stated 0.002."""
-    rng = np.random.default_rng(11)
-    means = [
-        contact_region(posterior(SHAPES[name](rng, 1000)), 3).least_probability(*SHAPES[name](rng, 1000).T).mean()
-        for _ in range(100)
-    ]
-    assert abs(np.mean(means) - 0.5) < 4.0 * np.std(means) / 10.0 + 0.002
-
-
 DRAWS = posterior(np.zeros((400, 2)))
 
 

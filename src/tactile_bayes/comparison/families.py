@@ -22,14 +22,13 @@ from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
-from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.priors import matched_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
-from tactile_bayes.inference.starts.contour_start import Walk, walk_of
+from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.numerics.random_numbers import Rng, spawn
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
@@ -176,7 +175,8 @@ def compare_families(
         of_family = spawn(seeds[name], 4)
         with threadpool_limits(1):
             walk = walk_of(problem.model, of_family[0], settings)
-            ceiling = _ceiling(problem.model, walk)
+            points, _ = walk.coordinates.parameters(walk.start.reshape(-1, len(problem.model.names)))
+            ceiling = float(np.max(problem.model.log_probability(points) - problem.model.log_prior(points)))
         if ceiling < best - GIVEN_UP:
             tried[name] = _Tried(ceiling)
             continue
@@ -198,12 +198,6 @@ def compare_families(
     record = experiment.record
     about = {"data_sha256": record_hash(record), "units": record.attrs["units"], **reach_attributes(record)}
     return comparison.assign_attrs(about)
-
-
-def _ceiling(model: ContourModel, walk: Walk) -> float:
-    """Return the largest log-likelihood among the starting points of the walkers."""
-    points, _ = walk.coordinates.parameters(walk.start.reshape(-1, len(model.names)))
-    return float(np.max(model.log_probability(points) - model.log_prior(points)))
 
 
 def checked_families(families: Sequence[Family | str]) -> list[Family]:

@@ -38,7 +38,7 @@ class LeftOut(NamedTuple):
 
     log_density: Floats  # shape (samples,)
     # Monte-Carlo error of each, allowing for autocorrelation; too small, maybe several times, where k̂ is above 0.5,
-    # and infinite where it is above `largest_k`.
+    # and infinite where so many draws are too few for k̂.
     standard_error: Floats
     # Shape of the weights' tail, k̂; −∞ where the largest weights are all the same, ∞ where no tail can be fitted.
     pareto_k: Floats
@@ -99,11 +99,6 @@ def _densities(model: ContourModel, draws: Draws) -> Floats:
     return np.concatenate(logs).reshape(chains, kept.size, -1)
 
 
-def largest_k(draws: int) -> float:
-    """Return the Pareto k̂ above which so many draws are too few (Vehtari et al. 2024, JMLR 25(72))."""
-    return min(1.0 - 1.0 / math.log10(draws), LARGEST_K)
-
-
 def left_out(log_densities: Floats) -> LeftOut:
     """Return leave-one-out densities by Pareto-smoothed importance sampling, from (chains, draws, samples).
 
@@ -114,7 +109,7 @@ def left_out(log_densities: Floats) -> LeftOut:
     if chains * draws < _LEAST_DRAWS:
         raise ParameterError(f"log_densities has {chains * draws} draws: give {_LEAST_DRAWS} at least")
     found = LeftOut(*np.empty((3, samples)))
-    worst = largest_k(chains * draws)
+    worst = min(1.0 - 1.0 / math.log10(chains * draws), LARGEST_K)  # Vehtari et al. 2024, JMLR 25(72)
     for i in range(samples):
         log_density = np.ascontiguousarray(logs[..., i])
         log_weights, k = _smoothed(log_density)
