@@ -167,7 +167,7 @@ def compare_families(
     seeds = dict(zip(compared, spawn(rng, len(compared)), strict=True))
     tried: dict[str, _Tried] = {}
     problems = {
-        name: contour_problem(replace(experiment, family=matched(family, length))) for name, family in compared.items()
+        name: contour_problem(replace(experiment, family=matched(one, length))) for name, one in compared.items()
     }
     # The shape-free family fits any record and comes first, so that families far from fitting need not be sampled.
     for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
@@ -300,6 +300,5 @@ def _left_out(predicted: Sequence[LeftOut | None]) -> dict[str, Any]:
         "weight": weight,
         "largest_k": np.fmax.reduce(tails, axis=1),
     }
-    return {name: ("family", values) for name, values in of_families.items()} | {
-        "log_density": (("family", "sample"), logs)
-    }
+    found: dict[str, Any] = {name: ("family", values) for name, values in of_families.items()}
+    return found | {"log_density": (("family", "sample"), logs)}

@@ -145,9 +145,7 @@ FLANKS: dict[str, Flank] = {
             "n": FamilyParameter("exponent", 0, log_normal(0.7, 1.0, loc=1.0), (1.1, 50.0)),
         },
         start=lambda a: {"w": 1.0 / a, "n": 2.0},
-        miss=lambda u, v, values: (
-            values["w"] * np.minimum(np.abs(u / values["w"]), _FAR) ** np.minimum(values["n"], 50.0) - v
-        ),
+        miss=lambda u, v, values: values["w"] * np.minimum(np.abs(u / values["w"]), _FAR) ** values["n"] - v,
         build=PowerLaw.of_width,
     ),
 }

@@ -65,7 +65,7 @@ class ShapeFree(Tabled):
             raise ContourError("ShapeFree: slope_angles must be at least 4 increasing angles in [−π/2, π/2] radians")
         if values.shape[-1:] != knots.shape:
             raise ContourError(
-                f"ShapeFree: log_radius of shape {values.shape} has not one value for each of {knots.size} slope angles"
+                f"ShapeFree: log_radius has shape {values.shape}: give a value for each of {knots.size} knots"
             )
         if at.ndim or not knots[0] <= at <= knots[-1]:
             raise ContourError(f"ShapeFree: at = {self.at} is not among the slope angles {knots[0]:g} to {knots[-1]:g}")

@@ -102,26 +102,17 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     certificate, is_open = triangle(left, right), right_x > left_x
     some = is_open if is_open.any() else np.full_like(is_open, True)  # all are NaN if none leaves a gap
     vertex_x, vertex_y = contours.point(0.0)
-    length, angle = length_unit(posterior), {"units": "rad"}
-    of_draws = {
-        "left": (left_x, length),
-        "right": (right_x, length),
-        "width": (right_x - left_x, length),
-        "left_y": (left.y, length),
-        "right_y": (right.y, length),
-        "left_slope_angle": (left.slope_angle, angle),
-        "right_slope_angle": (right.slope_angle, angle),
-        "vertex_x": (vertex_x, length),
-        "vertex_y": (vertex_y, length),
-        "apex_x": (certificate.apex_x[some], length),
-        "apex_y": (certificate.apex_y[some], length),
-        "triangle_height": (certificate.height[some], length),
-        "triangle_width": (certificate.width[some], length),
-        "snap_off_drive_angle": (_rows(events["snap_off_drive_angle"])[touched], angle),
-    }
+    lengths = {"left": left_x, "right": right_x, "width": right_x - left_x, "left_y": left.y, "right_y": right.y}
+    lengths |= {"vertex_x": vertex_x, "vertex_y": vertex_y}
+    lengths |= {name: getattr(certificate, name)[some] for name in ("apex_x", "apex_y")}
+    lengths |= {f"triangle_{name}": getattr(certificate, name)[some] for name in ("height", "width")}
+    angles = {"left_slope_angle": left.slope_angle, "right_slope_angle": right.slope_angle}
+    angles |= {"snap_off_drive_angle": _rows(events["snap_off_drive_angle"])[touched]}
+    length = length_unit(posterior)
     variables: dict[str, Any] = {
         name: (("bound", "segment")[: values.ndim], np.quantile(values, levels, axis=0), unit)
-        for name, (values, unit) in of_draws.items()
+        for of_draws, unit in ((lengths, length), (angles, {"units": "rad"}))
+        for name, values in of_draws.items()
     }
     begin, end = (float(np.median(x)) for x in (left_x, right_x))
     known = end > begin

@@ -157,13 +157,10 @@ def contacts_of(
     """
     count, segments = contours.shape[0], likelihood.segments.samples
     travels = np.broadcast_to(likelihood.travels(angle, rig), (count, angle.size))
-    shape = (len(segments), max(own.size for own in segments))
-    samples = np.zeros(shape, dtype=np.intp)
-    in_sweep_frame = np.full((shape[0], count, shape[1]), np.nan)
-    for which, of_segment, own in zip(samples, in_sweep_frame, segments, strict=True):
-        which[: own.size] = own
-        of_segment[:, : own.size] = travels[:, own]
-    paths = likelihood.paths(contours, rig, exact=exact, drive_angles=in_sweep_frame.reshape(-1, shape[1]))
+    most = max(own.size for own in segments)
+    samples = np.stack([np.pad(own, (0, most - own.size), constant_values=-1) for own in segments])
+    by_segment = np.where(samples >= 0, travels[:, samples], np.nan).swapaxes(0, 1)
+    paths = likelihood.paths(contours, rig, exact=exact, drive_angles=by_segment.reshape(-1, most))
     batch_index, rank, states = paths.loaded_states()
     columns = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.rod)
     columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
