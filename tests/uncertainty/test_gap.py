@@ -100,27 +100,22 @@ def test_events_belong_to_the_draws_of_their_labels():
     np.testing.assert_allclose(gap(some).right_slope_angle.sel(bound="median"), expected, rtol=1e-12)
 
 
-def test_several_pivots_leave_open_what_none_has_reached():
-    segments = ["forward", "backward", "forward", "backward"]
-    found = gap(tree([[[0.3, -0.2, 0.1, -0.4]]], segments)).sel(bound="median")
-    assert (float(found.left), float(found.right)) == (-0.2, 0.1)
-    assert float(found.width) == pytest.approx(0.3)
-    assert found.snap_off_drive_angle.sizes == {"segment": 4}
-
-
-def test_arcs_of_several_pivots_are_merged():
-    """The second pivot's backward arc fills the middle of the first one's gap: the wider rest is described."""
-    segments = ["forward", "backward", "forward", "backward"]
-    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], segments, first=[1.0, -1.0, 1.0, -0.2]))
+@pytest.mark.parametrize(
+    ("last", "first", "left", "right", "gaps"),
+    [
+        ([0.3, -0.2, 0.1, -0.4], None, -0.2, 0.1, 1),
+        # The second pivot's backward arc fills the middle of the first one's gap: the wider rest is described.
+        ([0.3, -0.3, 0.6, 0.1], [1.0, -1.0, 1.0, -0.2], 0.1, 0.3, 2),
+        ([0.3, -0.3, 0.6, 0.1], [1.0, -1.0, 1.0, -0.05], -0.3, -0.05, 2),
+        ([0.3, -0.3, 0.6, 0.35], [1.0, -1.0, 1.0, -0.4], 0.35, 0.3, 0),
+    ],
+)
+def test_several_pivots_leave_open_what_none_has_reached(last, first, left, right, gaps):
+    found = gap(tree([[last]], ["forward", "backward"] * 2, first=first))
     middle = found.sel(bound="median")
-    assert found.attrs["gaps"] == 2
-    assert (float(middle.left), float(middle.right)) == (0.1, 0.3)
-    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], segments, first=[1.0, -1.0, 1.0, -0.05]))
-    middle = found.sel(bound="median")
-    assert (float(middle.left), float(middle.right)) == (-0.3, -0.05)
-    found = gap(tree([[[0.3, -0.3, 0.6, 0.35]]], segments, first=[1.0, -1.0, 1.0, -0.4]))
-    assert found.attrs["gaps"] == 0
-    assert float(found.width.sel(bound="median")) == pytest.approx(-0.05)
+    assert (float(middle.left), float(middle.right), found.attrs["gaps"]) == (left, right, gaps)
+    assert float(middle.width) == pytest.approx(right - left)
+    assert middle.snap_off_drive_angle.sizes == {"segment": 4}
 
 
 def test_sweeps_may_overlap():
