@@ -28,14 +28,12 @@ if TYPE_CHECKING:
 
 Family = Annotated[
     str,
-    typer.Option(
-        help="Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, any "
-        "smooth one."
-    ),
+    "Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, any "
+    "smooth one.",
 ]
 
 Records = Annotated[
-    list[Path], typer.Argument(help="Record, .csv or .nc, or a bag of ROS; or several, or a folder of them.")
+    list[Path], "Record, .csv or .nc, or a bag of ROS; or several, or a folder of them.", typer.Argument()
 ]
 
 # Quantities in the table of several records; the file has all.
@@ -50,26 +48,18 @@ def infer(
     out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, WATCH_PAGE, *MANY))],
     family: Family = "parabola",
     rig: RigOptions,
-    probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
+    probability: Annotated[float, "Probability of band and intervals.", typer.Option(min=0.0, max=1.0)] = 0.95,
     max_seconds: Annotated[
         float | None,
-        typer.Option(
-            help="Time limit for the search for a start and for sampling [s]; the draws made by then are the result. "
-            "Checks, files and figures come after it."
-        ),
+        "Time limit for the search for a start and for sampling [s]; the draws made by then are the result. Checks, "
+        "files and figures come after it.",
     ] = None,
     checkpoint: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder in which the state of the run is kept: the same command resumes a stopped run.",
-            file_okay=False,
-        ),
+        "Folder in which the state of the run is kept: the same command resumes a stopped run.",
         Writes(CHECKPOINT),
     ] = None,
-    no_figures: Annotated[
-        bool,
-        typer.Option("--no-figures", help="Draw no figures, which would take two seconds; the report has its own."),
-    ] = False,
+    no_figures: Annotated[bool, "Draw no figures, which would take two seconds; the report has its own."] = False,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
@@ -165,7 +155,7 @@ def _rows_of(table: xr.Dataset) -> Table:
 def demo(
     *,
     ctx: typer.Context,
-    out: Out = Path("results/demo"),
+    out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, "record.csv", "rig.toml"))] = Path("results/demo"),
     seed: Seed = 1,
     output: Output,
 ) -> Answer:

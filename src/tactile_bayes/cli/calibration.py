@@ -27,27 +27,22 @@ def calibrate(
     *,
     ctx: typer.Context,
     out: Annotated[Out, Writes((*CALIBRATION, "replicates.json"))],
-    family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
-    replicates: Annotated[int, typer.Option(help="Number of records.", min=1)] = 200,
+    family: Annotated[str, "Shape of the contours, as for infer, shape-free too."] = "parabola",
+    replicates: Annotated[int, "Number of records.", typer.Option(min=1)] = 200,
     rig: RigFile,
     base: Pivots = None,
-    drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 2.0,
+    drive_step: Annotated[float, "Step of the drive [degrees].", typer.Option(min=0.05, max=30.0)] = 2.0,
     truth: Annotated[
         Path | None,
-        typer.Option(
-            help="Another rig.toml, by which the records are simulated: what inference assumes is then wrong.",
-            dir_okay=False,
-        ),
+        "Another rig.toml, by which the records are simulated: what inference assumes is then wrong.",
+        typer.Option(dir_okay=False),
     ] = None,
     work: WorkerOptions,
     seed: Seed = 1,
     replicate: Annotated[
-        int | None,
-        typer.Option(help="Repeat this replicate alone, and print its result; nothing is written.", min=0),
+        int | None, "Repeat this replicate alone, and print its result; nothing is written.", typer.Option(min=0)
     ] = None,
-    debug: Annotated[
-        bool, typer.Option("--debug", help="Show the traceback of an error; with --replicate, of the one that lost it.")
-    ] = False,
+    debug: Annotated[bool, "Show the traceback of an error; with --replicate, of the one that lost it."] = False,
     output: Output,
 ) -> Answer:
     """Measure how often intervals hold: simulate records, infer from each, and compare with the truth.

@@ -3,8 +3,9 @@
 A command is a function. Its parameters are options or groups of options: a group is a dataclass whose fields are
 options and whose properties interpret them. The last group is `Output`. The function returns an `Answer`.
 
-A path is read by the command unless it is marked with `Writes`, and a text that is marked with `Reads` may be a path.
-An output that is an input is refused before the function is called.
+An option is annotated with its type and its help, beside what else Typer is to know of it. A switch that is off is
+turned on by its name alone. A path is read by the command unless it is marked with `Writes`, and a text that is marked
+with `Reads` may be a path. An output that is an input is refused before the function is called.
 """
 
 from __future__ import annotations
@@ -13,17 +14,18 @@ from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
+from typer.models import ParameterInfo
 
 from tactile_bayes.cli.answer import Answer, print_answer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-Out = Annotated[Path, typer.Option(help="Folder for results; created if missing.", file_okay=False)]
-Seed = Annotated[int, typer.Option(help="Seed of random numbers; the same seed gives the same numbers.", min=0)]
+Out = Annotated[Path, "Folder for results; created if missing."]
+Seed = Annotated[int, "Seed of random numbers; the same seed gives the same numbers.", typer.Option(min=0)]
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,8 @@ class Writes:
 class Output:
     """Options for the progress and the answer of a command."""
 
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object in place of sentences.")] = False
+    quiet: Annotated[bool, "No progress, only the result.", typer.Option("--quiet", "-q")] = False
+    json: Annotated[bool, "Print one JSON object in place of sentences."] = False
 
     @property
     def is_silent(self) -> bool:
@@ -101,10 +103,25 @@ def _refuse_replaced_inputs(options: Iterable[Parameter], given: Mapping[str, An
 
 
 def _options(owner: Callable[..., Any]) -> Iterator[Parameter]:
-    """Yield the options of a command, or of a group."""
+    """Yield the options of a command, or of a group, as Typer takes them."""
     hints = get_type_hints(owner, include_extras=True)
     for name, parameter in signature(owner).parameters.items():
         if is_dataclass(hints[name]):
             yield from _options(hints[name])
         else:
-            yield parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[name])
+            option = parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[name])
+            yield option if get_origin(hints[name]) is None else _as_typer_takes_it(option)
+
+
+def _as_typer_takes_it(option: Parameter) -> Parameter:
+    """Return an option whose help, and kind of path, Typer is told."""
+    kind, *marks = get_args(option.annotation)
+    info: Any = next((mark for mark in marks if isinstance(mark, ParameterInfo)), None)
+    if info is None:
+        names = [f"--{option.name.replace('_', '-')}"] if option.default is False else []
+        info = typer.Option(*names)
+        marks.append(info)
+    info.help = next(mark for mark in marks if isinstance(mark, str))
+    if written := [mark for mark in marks if isinstance(mark, Writes)]:
+        info.file_okay, info.dir_okay = not written[0].names, bool(written[0].names)
+    return option.replace(annotation=Annotated[kind, *marks])

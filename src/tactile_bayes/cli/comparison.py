@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.progress import sampling_bar
@@ -29,22 +27,15 @@ def compare(
     out: Annotated[Out, Writes(COMPARISON)],
     family: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Shape to be compared, as for infer, or shape-free, any smooth one; may be repeated. By "
-            "default parabola, circle, ellipse, power-law, power-law/power-law and shape-free."
-        ),
+        "Shape to be compared, as for infer, or shape-free, any smooth one; may be repeated. By default parabola, "
+        "circle, ellipse, power-law, power-law/power-law and shape-free.",
     ] = None,
     rig: RigOptions,
     leave_one_out: Annotated[
-        bool,
-        typer.Option(
-            "--leave-one-out/--no-leave-one-out",
-            help="Compute how well each family predicts a sample from all the others; this doubles the time.",
-        ),
+        bool, "Compute how well each family predicts a sample from all the others; this doubles the time."
     ] = True,
     max_seconds: Annotated[
-        float | None,
-        typer.Option(help="Time limit for sampling each family [s]; the draws made by then are compared."),
+        float | None, "Time limit for sampling each family [s]; the draws made by then are compared."
     ] = None,
     seed: Seed = 1,
     output: Output,

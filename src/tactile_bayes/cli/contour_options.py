@@ -22,33 +22,23 @@ class ContourOptions:
     """A contour: a profile, one of a family, or measured points."""
 
     profile: Annotated[
-        Literal["I", "II", "III", "IV"] | None,
-        typer.Option(help="Profile of Merker et al. 2018, scaled to the rod; by default II."),
+        Literal["I", "II", "III", "IV"] | None, "Profile of Merker et al. 2018, scaled to the rod; by default II."
     ] = None
-    distance: Annotated[
-        float | None, typer.Option(help="Height of the profile's vertex [rod lengths]; by default 0.5.")
-    ] = None
+    distance: Annotated[float | None, "Height of the profile's vertex [rod lengths]; by default 0.5."] = None
     family: Annotated[
         str | None,
-        typer.Option(
-            help="In place of a profile: parabola, circle, ellipse, power-law, or one for each flank: "
-            "parabola/power-law."
-        ),
+        "In place of a profile: parabola, circle, ellipse, power-law, or one for each flank: parabola/power-law.",
     ] = None
     parameter: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Parameter of the family, by the name and in the unit that infer prints: a=0.7, q=0.5; may be "
-            "repeated. x_c is 0 if it is left out."
-        ),
+        "Parameter of the family, by the name and in the unit that infer prints: a=0.7, q=0.5; may be repeated. x_c is "
+        "0 if it is left out.",
     ] = None
     points: Annotated[
         Path | None,
-        typer.Option(
-            help="In place of both, measured points of a contour, which may scatter: a CSV file of x and y, with units "
-            "in their names, like x [mm], or in m, or L; or a DXF drawing.",
-            dir_okay=False,
-        ),
+        "In place of both, measured points of a contour, which may scatter: a CSV file of x and y, with units in their "
+        "names, like x [mm], or in m, or L; or a DXF drawing.",
+        typer.Option(dir_okay=False),
     ] = None
 
     def contour(self, rod: Rod) -> Contour:
@@ -81,16 +71,11 @@ class ContourOptions:
 class GaugeOptions:
     """A gauge: a known contour of a family."""
 
-    family: Annotated[
-        str,
-        typer.Option(help="Shape of the gauge, as for scan: circle, parabola, ellipse, power-law, or two with /."),
-    ]
+    family: Annotated[str, "Shape of the gauge, as for scan: circle, parabola, ellipse, power-law, or two with /."]
     parameter: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Parameter of the gauge in the record's coordinates, exactly known [m, or L]: r=0.01, q=0.05; may be "
-            "repeated. x_c is 0 if it is left out."
-        ),
+        "Parameter of the gauge in the record's coordinates, exactly known [m, or L]: r=0.01, q=0.05; may be repeated. "
+        "x_c is 0 if it is left out.",
     ] = None
 
     @property

@@ -24,7 +24,7 @@ dataset = typer.Typer(
     rich_markup_mode=None,
 )
 
-Folder = Annotated[Path, typer.Argument(help="Folder of the data set.")]
+Folder = Annotated[Path, "Folder of the data set.", typer.Argument()]
 
 
 @dataset.command(epilog="Example: tactile-bayes dataset example > set.toml")
@@ -42,12 +42,8 @@ def example() -> None:
 @as_command
 def generate(
     *,
-    specification: Annotated[
-        Path, typer.Argument(metavar="SPEC.toml", help="Specification, .toml: see dataset example.")
-    ],
-    out: Annotated[
-        Path, typer.Option(help="Folder for the data set; created if missing.", file_okay=False), Writes(DATASET)
-    ],
+    specification: Annotated[Path, "Specification, .toml: see dataset example.", typer.Argument(metavar="SPEC.toml")],
+    out: Annotated[Path, "Folder for the data set; created if missing.", Writes(DATASET)],
     work: WorkerOptions,
     output: Output,
 ) -> Answer:
@@ -78,7 +74,7 @@ def generate(
 def verify(
     *,
     folder: Folder,
-    regenerate: Annotated[int, typer.Option(help="Files to be made again, and compared number by number.", min=0)] = 0,
+    regenerate: Annotated[int, "Files to be made again, and compared number by number.", typer.Option(min=0)] = 0,
     output: Output,
 ) -> Answer:
     """Check every byte of a data set.
@@ -100,12 +96,10 @@ def verify(
 @as_command
 def record(
     *,
-    source: Annotated[Path, typer.Argument(help="Folder of the data set, or its specification, .toml.")],
-    index: Annotated[int, typer.Argument(help="Number of the record; the first is 0.")],
-    out: Annotated[Path, typer.Option(help="File for the record, .csv or .nc.", dir_okay=False), Writes()],
-    truth: Annotated[
-        bool, typer.Option("--truth/--no-truth", help="Write the columns of the truth, or leave them out.")
-    ] = True,
+    source: Annotated[Path, "Folder of the data set, or its specification, .toml.", typer.Argument()],
+    index: Annotated[int, "Number of the record; the first is 0.", typer.Argument()],
+    out: Annotated[Path, "File for the record, .csv or .nc.", Writes()],
+    truth: Annotated[bool, "Write the columns of the truth, or leave them out."] = True,
     output: Output,
 ) -> Answer:
     """Write one record to a file, as `infer` takes it."""

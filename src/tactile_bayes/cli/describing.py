@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 def rig(
     *,
     path: Annotated[
-        Path | None, typer.Argument(metavar="RIG.toml", help="File of a rig, to be checked.", dir_okay=False)
+        Path | None, "File of a rig, to be checked.", typer.Argument(metavar="RIG.toml", dir_okay=False)
     ] = None,
-    parameters: Annotated[bool, typer.Option("--parameters", help="List what may be unknown of a rig.")] = False,
+    parameters: Annotated[bool, "List what may be unknown of a rig."] = False,
     output: Output,
 ) -> Answer:
     """Check the file of a rig, and print what it states, what is known of it, and what is unknown.

@@ -29,32 +29,22 @@ def design(
     out: Annotated[Out, Writes((*DESIGN, "nested/*"))],
     run: Annotated[
         Path | None,
-        typer.Argument(help="Folder of a run of infer, or its posterior.nc, as present knowledge; else the prior."),
+        "Folder of a run of infer, or its posterior.nc, as present knowledge; else the prior.",
+        typer.Argument(),
         Reads(("posterior.nc",)),
     ] = None,
-    family: Annotated[str, typer.Option(help="Shape of the contours, if only a prior is known.")] = "parabola",
+    family: Annotated[str, "Shape of the contours, if only a prior is known."] = "parabola",
     base: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A pivot to choose from, X,Y [m, or L]; may be repeated. By default, without --carry, "
-            "eleven across at three heights."
-        ),
+        "A pivot to choose from, X,Y [m, or L]; may be repeated. By default, without --carry, eleven across at three "
+        "heights.",
     ] = None,
-    drive_step: Annotated[
-        list[float] | None, typer.Option(help="A step of the drive to choose from [degrees]; by default 2.")
-    ] = None,
-    criterion: Annotated[
-        Criterion, typer.Option(help="The narrowest band, the smallest gap, or the most information.")
-    ] = "band",
+    drive_step: Annotated[list[float] | None, "A step of the drive to choose from [degrees]; by default 2."] = None,
+    criterion: Annotated[Criterion, "The narrowest band, the smallest gap, or the most information."] = "band",
     nested: Annotated[
-        bool,
-        typer.Option(
-            "--nested",
-            help="Sample each candidate's posteriors as well, which takes longer; the same command resumes a stopped "
-            "run.",
-        ),
+        bool, "Sample each candidate's posteriors as well, which takes longer; the same command resumes a stopped run."
     ] = False,
-    draws: Annotated[int, typer.Option(help="Number of objects drawn from posterior or prior.", min=2)] = 24,
+    draws: Annotated[int, "Number of objects drawn from posterior or prior.", typer.Option(min=2)] = 24,
     carries: CarryOptions,
     rig: RigFile,
     work: WorkerOptions,

@@ -21,7 +21,7 @@ _STEPS = (0.001, 28.0)  # smallest and largest step of rotations [degrees]
 Directions = Literal["both", "forward", "backward"]
 
 Pivots = Annotated[
-    list[str] | None, typer.Option("--base", help="A pivot, X,Y [m, or L]; may be repeated. By default one at 0,0.")
+    list[str] | None, "A pivot, X,Y [m, or L]; may be repeated. By default one at 0,0.", typer.Option("--base")
 ]
 
 
@@ -36,12 +36,10 @@ class CarryOptions:
 
     carry: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Carry the base along a line, the rod clamped: X,Y,HEADING,DRIVE_ANGLE,TRAVEL, where it begins, its "
-            "direction and the slope of the rod [degrees], and how far it moves, with lengths as of --base; or along "
-            "any path: a CSV file with columns x, y [m, or L] and drive_angle [degrees], a line for each pose. May be "
-            "repeated; there are rotations beside it only about each --base that is given."
-        ),
+        "Carry the base along a line, the rod clamped: X,Y,HEADING,DRIVE_ANGLE,TRAVEL, where it begins, its direction "
+        "and the slope of the rod [degrees], and how far it moves, with lengths as of --base; or along any path: a CSV "
+        "file with columns x, y [m, or L] and drive_angle [degrees], a line for each pose. May be repeated; there are "
+        "rotations beside it only about each --base that is given.",
         Reads(),
     ] = None
 
@@ -56,10 +54,8 @@ class DriveOptions(CarryOptions):
 
     drive_step: Annotated[
         float | None,
-        typer.Option(
-            help="Step of rotations [degrees], by default 1; of --carry [m, or L], by default a hundredth of the rod's "
-            "length, or the poses if they are more than 8."
-        ),
+        "Step of rotations [degrees], by default 1; of --carry [m, or L], by default a hundredth of the rod's length, "
+        "or the poses if they are more than 8.",
     ] = None
 
     def drives(self, base: Sequence[str] | None, direction: Directions = "both") -> list[Drive]:

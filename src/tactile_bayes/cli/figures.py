@@ -17,27 +17,21 @@ from tactile_bayes.runs.names import FIGURES
 def figures(
     *,
     out: Annotated[Out, Writes(FIGURES)],
-    only: Annotated[
-        list[int] | None, typer.Option(help="Number of a figure, from 2 to 11; may be repeated. By default all.")
-    ] = None,
+    only: Annotated[list[int] | None, "Number of a figure, from 2 to 11; may be repeated. By default all."] = None,
     format: Annotated[
         list[str] | None,
-        typer.Option("--format", help="Format of the files, pdf, svg or png; may be repeated; default pdf and png."),
+        "Format of the files, pdf, svg or png; may be repeated; default pdf and png.",
+        typer.Option("--format"),
     ] = None,
     distance: Annotated[
-        list[float] | None,
-        typer.Option(help="Height of the profile above the origin, q [L]; may be repeated; default the figure's own."),
+        list[float] | None, "Height of the profile above the origin, q [L]; may be repeated; default the figure's own."
     ] = None,
-    drive_step: Annotated[float | None, typer.Option(help="Step of the drive [degrees], by default 1.")] = None,
-    rods: Annotated[int, typer.Option(help="Number of rods drawn of a sweep in figures 7 to 10.", min=1)] = 15,
+    drive_step: Annotated[float | None, "Step of the drive [degrees], by default 1."] = None,
+    rods: Annotated[int, "Number of rods drawn of a sweep in figures 7 to 10.", typer.Option(min=1)] = 15,
     noise: NoiseOptions,
     seed: Seed = 1,
-    column: Annotated[
-        bool, typer.Option("--column", help="Draw for a column, 3.5 inches wide, instead of a page, 7 inches.")
-    ] = False,
-    style: Annotated[
-        Literal["print", "screen"], typer.Option(help="Letters of 8 points for print, or of 10 for the screen.")
-    ] = "print",
+    column: Annotated[bool, "Draw for a column, 3.5 inches wide, instead of a page, 7 inches."] = False,
+    style: Annotated[Literal["print", "screen"], "Letters of 8 points for print, or of 10 for the screen."] = "print",
     output: Output,
 ) -> Answer:
     """Draw Figures 2 to 11 of Merker et al. 2018 (doi 10.1155/2018/1613945) from our own computation.

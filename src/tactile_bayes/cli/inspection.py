@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.numbers import assigned
@@ -40,25 +38,14 @@ class _FileOptions(RigOptions):
 
     column: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Source of a column with another name, unit, sign, factor or zero in the file: force_x=Fx[mN], "
-            "force_y=-1e-3*Fy[N], drive_angle=90-Angle[deg], base_x=12[mm]; may be repeated."
-        ),
+        "Source of a column with another name, unit, sign, factor or zero in the file: force_x=Fx[mN], "
+        "force_y=-1e-3*Fy[N], drive_angle=90-Angle[deg], base_x=12[mm]; may be repeated.",
     ] = None
-    split_sweeps: Annotated[
-        bool,
-        typer.Option(
-            "--split-sweeps", help="Find sweeps and directions by the turns of the drive, if not in the file."
-        ),
-    ] = False
-    missing: Annotated[
-        list[str] | None, typer.Option(help="Channel without a column, like force_x; may be repeated.")
-    ] = None
+    split_sweeps: Annotated[bool, "Find sweeps and directions by the turns of the drive, if not in the file."] = False
+    missing: Annotated[list[str] | None, "Channel without a column, like force_x; may be repeated."] = None
     frame: Annotated[
         Literal["fixed", "turning"] | None,
-        typer.Option(
-            help="Axes of the forces, if not in the file: fixed in the laboratory, or turning with the drive."
-        ),
+        "Axes of the forces, if not in the file: fixed in the laboratory, or turning with the drive.",
     ] = None
 
     @property
@@ -91,9 +78,7 @@ def inspect(
     *,
     record: Record,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder for rig.toml, a figure, tables and this text; created if missing.", file_okay=False),
-        Writes(INSPECTION),
+        Path | None, "Folder for rig.toml, a figure, tables and this text; created if missing.", Writes(INSPECTION)
     ] = None,
     rig: _FileOptions,
     output: Output,

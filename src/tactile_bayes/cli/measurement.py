@@ -20,13 +20,11 @@ if TYPE_CHECKING:
 
 def measure(
     *,
-    record: Annotated[Path, typer.Argument(help="Ideal record, .csv or .nc, as scan writes it.")],
+    record: Annotated[Path, "Ideal record, .csv or .nc, as scan writes it.", typer.Argument()],
     out: RecordFile,
     rig: RigFile,
     noise: NoiseOptions,
-    keep_truth: Annotated[
-        bool, typer.Option("--keep-truth", help="Keep the columns of the truth, which a laboratory does not have.")
-    ] = False,
+    keep_truth: Annotated[bool, "Keep the columns of the truth, which a laboratory does not have."] = False,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:

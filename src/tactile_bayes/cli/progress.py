@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from tactile_bayes.cli.interrupts import resumable
 
 if TYPE_CHECKING:
@@ -32,10 +30,8 @@ class WorkerOptions:
 
     workers: Annotated[
         str | None,
-        typer.Option(
-            help="Number of local processes, by default one for each core; or the address of a Dask scheduler, like "
-            "tcp://10.0.0.1:8786."
-        ),
+        "Number of local processes, by default one for each core; or the address of a Dask scheduler, like "
+        "tcp://10.0.0.1:8786.",
     ] = None
 
     def reporting(self, progress: Callable[[TaskProgress], object]) -> Workers:

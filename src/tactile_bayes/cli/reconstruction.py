@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Writes
 from tactile_bayes.cli.progress import step_bar
@@ -31,10 +29,8 @@ def reconstruct(
     out: Annotated[Out, Writes(RECONSTRUCTION)],
     method: Annotated[
         Literal["raw", "constrained"] | None,
-        typer.Option(
-            help="raw uses the four numbers of a sample as they are; constrained, the default if there is noise, finds "
-            "the most probable contact that a rod can make."
-        ),
+        "raw uses the four numbers of a sample as they are; constrained, the default if there is noise, finds the most "
+        "probable contact that a rod can make.",
     ] = None,
     rig: RigOptions,
     output: Output,

@@ -16,28 +16,25 @@ def report(
     *,
     run: Annotated[
         list[Path],
-        typer.Argument(help="Folder of a run of infer; or a folder of several, or several: then side by side."),
+        "Folder of a run of infer; or a folder of several, or several: then side by side.",
+        typer.Argument(),
         Reads(("posterior.nc", "trust.nc", "comparison.nc", "runs.nc", "*/posterior.nc")),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="File for the page; report.html in that folder if left out, which only one folder allows.",
-            dir_okay=False,
-        ),
+        "File for the page; report.html in that folder if left out, which only one folder allows.",
         Writes(),
     ] = None,
     compare: Annotated[
         Path | None,
-        typer.Option(help="Folder of a run of compare on the same record; the run's own if left out.", file_okay=False),
+        "Folder of a run of compare on the same record; the run's own if left out.",
+        typer.Option(file_okay=False),
         Reads(("comparison.nc",)),
     ] = None,
     overlay: Annotated[
         Path | None,
-        typer.Option(
-            help="Another run, or a true contour, to lay over it, with the distance in the table: a folder of infer, a "
-            "CSV file of x and y with units in their names, like x [mm], or a DXF drawing, in the laboratory frame."
-        ),
+        "Another run, or a true contour, to lay over it, with the distance in the table: a folder of infer, a CSV file "
+        "of x and y with units in their names, like x [mm], or a DXF drawing, in the laboratory frame.",
         Reads(("posterior.nc",)),
     ] = None,
     output: Output,

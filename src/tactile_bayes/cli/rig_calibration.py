@@ -22,13 +22,12 @@ if TYPE_CHECKING:
 def calibrate_rig(
     *,
     record: Annotated[
-        list[Path],
-        typer.Argument(help="Records of the gauge, .csv or .nc, each with its own zeros and its pivots."),
+        list[Path], "Records of the gauge, .csv or .nc, each with its own zeros and its pivots.", typer.Argument()
     ],
     out: Annotated[Out, Writes(RIG)],
     gauge: GaugeOptions,
     rig: RigOptions,
-    probability: Annotated[float, typer.Option(help="Probability of the intervals.", min=0.0, max=1.0)] = 0.95,
+    probability: Annotated[float, "Probability of the intervals.", typer.Option(min=0.0, max=1.0)] = 0.95,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:

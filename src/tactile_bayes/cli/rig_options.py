@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.rig import Rig
 
-Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc, or a bag of ROS.")]
+Record = Annotated[Path, "Record, .csv or .nc, or a bag of ROS.", typer.Argument()]
 
 
 class _ReadsRig(Reads):
@@ -43,12 +43,9 @@ class RigFile:
 
     rig: Annotated[
         Path | None,
-        typer.Option(
-            help="rig.toml, the rig: rod, load cell, names and units in its files, and what is unknown of it; "
-            "calibrate-rig and inspect write one. By default as the record states, if there is one, with the doubts of "
-            "a real rig.",
-            dir_okay=False,
-        ),
+        "rig.toml, the rig: rod, load cell, names and units in its files, and what is unknown of it; calibrate-rig and "
+        "inspect write one. By default as the record states, if there is one, with the doubts of a real rig.",
+        typer.Option(dir_okay=False),
         _ReadsRig(),
     ] = None
 
@@ -93,12 +90,9 @@ class NoiseOptions:
     """Noise of a load cell."""
 
     force_noise: Annotated[
-        float | None,
-        typer.Option(help="Standard deviation of the forces [N, or EI/L²], in place of one that is stated."),
+        float | None, "Standard deviation of the forces [N, or EI/L²], in place of one that is stated."
     ] = None
-    moment_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; likewise.")
-    ] = None
+    moment_noise: Annotated[float | None, "Standard deviation of the moment [N m, or EI/L]; likewise."] = None
 
     def in_place_of(self, cell: LoadCell | None) -> LoadCell | None:
         """Return a load cell with the noise that is given."""
@@ -113,11 +107,9 @@ class NoiseOptions:
 class RigOptions(NoiseOptions, RigFile):
     """The file of a rig, and numbers that replace those in it."""
 
-    length: Annotated[
-        float | None, typer.Option(help="Rod length [m], if no file states it, or in place of that in rig.toml.")
-    ] = None
-    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²]; likewise.")] = None
-    diameter: Annotated[float | None, typer.Option(help="Rod diameter [m], at the base; likewise.")] = None
+    length: Annotated[float | None, "Rod length [m], if no file states it, or in place of that in rig.toml."] = None
+    flexural_rigidity: Annotated[float | None, "EI [N m²]; likewise."] = None
+    diameter: Annotated[float | None, "Rod diameter [m], at the base; likewise."] = None
 
     @property
     def stated(self) -> Rig:

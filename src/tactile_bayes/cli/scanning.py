@@ -6,8 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.contour_options import ContourOptions
@@ -23,11 +21,7 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.sweep import Event, Scan
 
-RecordFile = Annotated[
-    Path,
-    typer.Option(help="File for the record, .csv or .nc; its folder is created if missing.", dir_okay=False),
-    Writes(),
-]
+RecordFile = Annotated[Path, "File for the record, .csv or .nc; its folder is created if missing.", Writes()]
 
 
 def scan(
@@ -37,13 +31,9 @@ def scan(
     rig: RigFile,
     base: Pivots = None,
     drive: DriveOptions,
-    direction: Annotated[Directions, typer.Option(help="Sense of the rotations about each pivot.")] = "both",
+    direction: Annotated[Directions, "Sense of the rotations about each pivot."] = "both",
     figure: Annotated[
-        Path | None,
-        typer.Option(
-            help="File for a figure of rod and loads along the sweeps, .png, .pdf or .svg; likewise.", dir_okay=False
-        ),
-        Writes(),
+        Path | None, "File for a figure of rod and loads along the sweeps, .png, .pdf or .svg; likewise.", Writes()
     ] = None,
     output: Output,
 ) -> Answer:

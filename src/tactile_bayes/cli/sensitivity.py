@@ -30,44 +30,33 @@ def sensitivity(
     out: Annotated[Out, Writes((*SENSITIVITY, "study/*"))],
     profile: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Profile of Merker et al. 2018, I, II, III or IV, by default II, scaled to the rod; further ones are "
-            "for the study."
-        ),
+        "Profile of Merker et al. 2018, I, II, III or IV, by default II, scaled to the rod; further ones are for the "
+        "study.",
     ] = None,
     distance: Annotated[
-        list[float] | None,
-        typer.Option(help="Height of its vertex above the x axis [rod lengths], by default 0.5; likewise."),
+        list[float] | None, "Height of its vertex above the x axis [rod lengths], by default 0.5; likewise."
     ] = None,
     rig: RigFile,
     base: Pivots = None,
-    drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 1.0,
+    drive_step: Annotated[float, "Step of the drive [degrees].", typer.Option(min=0.05, max=30.0)] = 1.0,
     band_width: Annotated[
         list[float] | None,
-        typer.Option(
-            help="Mean width of a band for which the noise is sought [m, or L]; may be repeated. "
-            "By default 0.0005 to 0.01 rod lengths."
-        ),
+        "Mean width of a band for which the noise is sought [m, or L]; may be repeated. By default 0.0005 to 0.01 rod "
+        "lengths.",
     ] = None,
     best_rod: Annotated[
         bool,
-        typer.Option(
-            "--best-rod",
-            help="Find the rod of the same material that suits the load cell: rig.toml states diameter, "
-            "elastic_strain (0.005 spring steel, 0.05 nitinol) and noise.",
-        ),
+        "Find the rod of the same material that suits the load cell: rig.toml states diameter, elastic_strain (0.005 "
+        "spring steel, 0.05 nitinol) and noise.",
     ] = False,
     replicates: Annotated[
         int,
-        typer.Option(
-            help="Simulate records as well, so many for each profile, distance and noise, from one pivot below each; 0 "
-            "leaves this study out.",
-            min=0,
-        ),
+        "Simulate records as well, so many for each profile, distance and noise, from one pivot below each; 0 leaves "
+        "this study out.",
+        typer.Option(min=0),
     ] = 0,
     noise_factor: Annotated[
-        list[float] | None,
-        typer.Option(help="Factor on the load cell's noise in the study; may be repeated. By default 0.1, 0.3, 1, 3."),
+        list[float] | None, "Factor on the load cell's noise in the study; may be repeated. By default 0.1, 0.3, 1, 3."
     ] = None,
     work: WorkerOptions,
     seed: Seed = 1,

@@ -19,28 +19,19 @@ if TYPE_CHECKING:
 
 def trust(
     *,
-    run: Annotated[Path, typer.Argument(help="Folder of a run of infer."), Reads(("posterior.nc",))],
+    run: Annotated[Path, "Folder of a run of infer.", typer.Argument(), Reads(("posterior.nc",))],
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder for the results; the run's own if left out, for its report.", file_okay=False),
-        Writes((*TRUST, "trust/*")),
+        Path | None, "Folder for the results; the run's own if left out, for its report.", Writes((*TRUST, "trust/*"))
     ] = None,
     replicates: Annotated[
         int,
-        typer.Option(
-            help="Number of truths like this one that are simulated and inferred again; 0 leaves this out.", min=0
-        ),
+        "Number of truths like this one that are simulated and inferred again; 0 leaves this out.",
+        typer.Option(min=0),
     ] = 100,
     assumptions: Annotated[
-        bool,
-        typer.Option(
-            "--assumptions/--no-assumptions",
-            help="Compute the band again with each unknown of the rig added or fixed, and with each other shape.",
-        ),
+        bool, "Compute the band again with each unknown of the rig added or fixed, and with each other shape."
     ] = True,
-    probability: Annotated[
-        float | None, typer.Option(help="Probability of the band; that of the run if left out.")
-    ] = None,
+    probability: Annotated[float | None, "Probability of the band; that of the run if left out."] = None,
     work: WorkerOptions,
     seed: Seed = 1,
     output: Output,

@@ -40,44 +40,37 @@ def watch(
     *,
     ctx: typer.Context,
     record: Annotated[
-        Path, typer.Argument(help="Record, .csv, to which another program appends rows; it may not be there yet.")
+        Path, "Record, .csv, to which another program appends rows; it may not be there yet.", typer.Argument()
     ],
     out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, *WATCH))],
     family: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Shape, as in infer, by default parabola; may be repeated: the probability of each is then reported, "
-            "and the band is averaged over them."
-        ),
+        "Shape, as in infer, by default parabola; may be repeated: the probability of each is then reported, and the "
+        "band is averaged over them.",
     ] = None,
     rig: RigFile,
-    probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
+    probability: Annotated[float, "Probability of band and intervals.", typer.Option(min=0.0, max=1.0)] = 0.95,
     particles: Annotated[
-        int, typer.Option(help="Number of particles: four times as many are twice as exact, and take as long.", min=100)
+        int, "Number of particles: four times as many are twice as exact, and take as long.", typer.Option(min=100)
     ] = 1000,
     between: Annotated[
-        str | None,
-        typer.Option(help="Ends X,X of the band [m, or L]; by default those of what its sweeps touch if they go on."),
+        str | None, "Ends X,X of the band [m, or L]; by default those of what its sweeps touch if they go on."
     ] = None,
     until_width: Annotated[
-        float | None,
-        typer.Option(help="End when the band is nowhere wider than this [m, or L] between the ends of --between."),
+        float | None, "End when the band is nowhere wider than this [m, or L] between the ends of --between."
     ] = None,
     until_probability: Annotated[
-        float | None,
-        typer.Option(help="End when a shape of several has a greater probability.", min=0.0, max=1.0),
+        float | None, "End when a shape of several has a greater probability.", typer.Option(min=0.0, max=1.0)
     ] = None,
     most_samples: Annotated[
         int,
-        typer.Option(
-            help="Largest number of samples that are taken into account: of a longer record every second one is, every "
-            "fourth, and so on.",
-            min=100,
-        ),
+        "Largest number of samples that are taken into account: of a longer record every second one is, every fourth, "
+        "and so on.",
+        typer.Option(min=100),
     ] = 1000,
-    poll: Annotated[float, typer.Option(help="Time from one look at the file to the next [s].", min=0.01)] = 0.5,
+    poll: Annotated[float, "Time from one look at the file to the next [s].", typer.Option(min=0.01)] = 0.5,
     idle: Annotated[
-        float | None, typer.Option(help="End when no row has come for so long [s]; by default Ctrl-C ends it.", min=0.0)
+        float | None, "End when no row has come for so long [s]; by default Ctrl-C ends it.", typer.Option(min=0.0)
     ] = None,
     seed: Seed = 1,
     output: Output,
