@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import traceback
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -18,12 +19,11 @@ from tactile_bayes.cli.rig_options import RigOptions
 from tactile_bayes.runs.names import CHECKPOINT, INFERENCE, MANY, OF_POSTERIOR, WATCH_PAGE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.contour import ContourRun
 
 Family = Annotated[
@@ -69,48 +69,40 @@ def infer(
     one table of all; the same command goes on with those that are not done, and records may be added.
     """
     from tactile_bayes.inference.ensembles import SamplerSettings
-    from tactile_bayes.runs.contour import analyse
     from tactile_bayes.runs.many import records_in
 
-    settings = SamplerSettings(max_seconds=max_seconds)
+    options: dict[str, Any] = {
+        "family": family,
+        "probability": probability,
+        "rng": seed,
+        "settings": SamplerSettings(max_seconds=max_seconds),
+        "figures": not no_figures,
+    }
     if (paths := records_in(record)) != record[:1]:
         if checkpoint is not None:
             raise typer.BadParameter("--checkpoint is for one record: of several, those that are done are kept")
-        return _of_many(paths, rig, out, family, probability, settings, seed, not no_figures, output)
+        return _of_many(paths, rig, out, output, options)
     measured, of_record = rig.read(paths[0])
-    with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent, max_seconds=max_seconds) as progress:
-        run = analyse(
-            measured,
-            out,
-            family=family,
-            rig=of_record,
-            checkpoint=checkpoint,
-            probability=probability,
-            rng=seed,
-            settings=settings,
-            record_file=paths[0],
-            command=ctx.meta["words"],
-            figures=not no_figures,
-            progress=progress,
-            follow=None if progress is None else progress.follow,
-        )
+    options |= {"rig": of_record, "checkpoint": checkpoint, "record_file": paths[0]}
+    run = _analysed(ctx, output, measured, out, max_seconds=max_seconds, **options)
     go_on = "with --checkpoint FOLDER the same command can resume an interrupted run"
     if checkpoint is not None:
         go_on = f"the same command resumes from the steps in {checkpoint}"
     return answer_of(ctx, run, run.files, {}, go_on)
 
 
-def _of_many(
-    paths: Sequence[Path],
-    rig: RigOptions,
-    out: Path,
-    family: str,
-    probability: float,
-    settings: SamplerSettings,
-    seed: int,
-    figures: bool,
-    output: Output,
-) -> Answer:
+def _analysed(
+    ctx: typer.Context, output: Output, *arguments: Any, max_seconds: float | None = None, **options: Any
+) -> ContourRun:
+    """Analyse a record with a bar; an interrupt ends the sampling, and is answered."""
+    from tactile_bayes.runs.contour import analyse
+
+    options["command"] = ctx.meta["words"]
+    with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent, max_seconds=max_seconds) as progress:
+        return analyse(*arguments, progress=progress, follow=None if progress is None else progress.follow, **options)
+
+
+def _of_many(paths: Sequence[Path], rig: RigOptions, out: Path, output: Output, options: dict[str, Any]) -> Answer:
     """Infer the contours of several records."""
     from tactile_bayes.runs.many import infer_contours
     from tactile_bayes.tasks import Workers
@@ -118,17 +110,7 @@ def _of_many(
     stated = rig.stated
     of_all = replace(stated, load_cell=rig.in_place_of(stated.load_cell))
     with resumable_bar("record", output.is_silent, out, len(paths)) as note:
-        table = infer_contours(
-            paths,
-            of_all,
-            out=out,
-            family=family,
-            rng=seed,
-            settings=settings,
-            probability=probability,
-            figures=figures,
-            workers=Workers(progress=note),
-        )
+        table = infer_contours(paths, of_all, out=out, workers=Workers(progress=note), **options)
     files = {"table": out / "runs.csv", "table, as NetCDF": out / "runs.nc"}
     return Answer([_rows_of(table), "", files], lambda: {"records": table.to_dict()["data_vars"], "files": files})
 
@@ -144,9 +126,8 @@ def _rows_of(table: xr.Dataset) -> Table:
         cells = []
         for quantity in shown:
             one = row.sel(quantity=quantity)
-            digits = decimals(float(one.upper - one.lower))
-            missing = bool(np.isnan(one["median"]))
-            cells.append("" if missing else f"{float(one['median']):.{digits}f}")
+            text = f"{float(one['median']):.{decimals(float(one.upper - one.lower))}f}"
+            cells.append("" if np.isnan(one["median"]) else text)
         said = str(row.error.values) or str(row.verdict.values)
         rows.append([name, *cells, f"{float(row.seconds):.0f} s", said])
     return table_of(["record", *shown, "time", "verdict"], rows, left=["record", "verdict"], may_wrap=True)
@@ -161,7 +142,6 @@ def demo(
 ) -> Answer:
     """Simulate a steel wire that sweeps along a parabola, and infer the contour with a band from its noisy record."""
     from tactile_bayes.rig import Rig, read_record
-    from tactile_bayes.runs.contour import analyse
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 
     path, of_rig = measure_demo(out, rng=seed)
@@ -175,19 +155,8 @@ def demo(
             flush=True,
         )
     rig = Rig.read(of_rig)
-    with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent) as progress:
-        run = analyse(
-            read_record(path, rig),
-            out,
-            family="parabola",
-            rig=rig,
-            rng=seed,
-            truth=CONTOUR,
-            record_file=path,
-            command=ctx.meta["words"],
-            progress=progress,
-            follow=None if progress is None else progress.follow,
-        )
+    options: dict[str, Any] = {"family": "parabola", "rig": rig, "rng": seed, "truth": CONTOUR, "record_file": path}
+    run = _analysed(ctx, output, read_record(path, rig), out, **options)
     return answer_of(ctx, run, {"record": path, "rig": of_rig, **run.files}, TRUTH, "the same command starts again")
 
 
@@ -195,24 +164,17 @@ def answer_of(
     ctx: typer.Context, run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float], go_on: str
 ) -> Answer:
     """Return the answer; messages name what is left out, and with --debug its traceback goes to stderr."""
-    if run.left_out:
-        _trace_back(run, in_full=ctx.find_root().params["debug"])
+    if run.left_out and ctx.find_root().params["debug"]:
+        for error in run.left_out.values():
+            typer.echo("".join(traceback.format_exception(error)), err=True)
+    elif run.left_out:
+        names = ", ".join(run.left_out)
+        typer.echo(f"tactile-bayes: left out: {names}; tactile-bayes --debug ... shows the traceback", err=True)
     return Answer(
         _words(run, files, truth),
         lambda: _numbers(run, files, truth),
         interrupted=f"interrupted, results are of what was made by then: {go_on}" if run.is_interrupted else "",
     )
-
-
-def _trace_back(run: ContourRun, *, in_full: bool) -> None:
-    import traceback
-
-    if in_full:
-        for error in run.left_out.values():
-            typer.echo("".join(traceback.format_exception(error)), err=True)
-    else:
-        names = ", ".join(run.left_out)
-        typer.echo(f"tactile-bayes: left out: {names}; tactile-bayes --debug ... shows the traceback", err=True)
 
 
 def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> dict[str, Any]:
@@ -264,10 +226,7 @@ def quantities(numbers: xr.Dataset, truth: Mapping[str, float]) -> Table:
     """Return the table of a summary, with the true values of a demonstration."""
     share = f"{numbers.attrs['probability']:.0%}"
     heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
-    return table_of(heads, _rows(numbers, truth), left=["quantity", "unit"], may_wrap=True)
-
-
-def _rows(numbers: xr.Dataset, truth: Mapping[str, float]) -> Iterable[list[str]]:
+    rows = []
     for name in numbers.quantity.values:
         if name.startswith("z_"):  # a weight of a random function, which has no meaning by itself
             continue
@@ -278,7 +237,8 @@ def _rows(numbers: xr.Dataset, truth: Mapping[str, float]) -> Iterable[list[str]
         ess = min(float(row["ess_bulk"]), float(row["ess_tail"]))
         checks = ["", ""] if ess != ess else [f"{float(row['r_hat']):.3f}", f"{ess:.0f}"]
         unit = str(row["unit"].values)
-        yield [str(name), *true, *shown, "" if unit == "1" else unit, *checks]
+        rows.append([str(name), *true, *shown, "" if unit == "1" else unit, *checks])
+    return table_of(heads, rows, left=["quantity", "unit"], may_wrap=True)
 
 
 def decimals(width: float) -> int:

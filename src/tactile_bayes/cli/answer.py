@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +35,14 @@ def print_answer(answer: Answer, as_json: bool) -> None:
         print_object(answer.numbers(), in_a_line=answer.in_a_line)
     else:
         for part in answer.parts:
-            _print_part(part)
+            if isinstance(part, str):
+                typer.echo(part)
+            elif isinstance(part, Mapping):
+                width = max(12, *map(len, part))
+                for what, path in part.items():
+                    typer.echo(f"{what:<{width}} {path}")
+            else:
+                _print_table(part)
     if answer.interrupted:
         typer.echo(f"tactile-bayes: {answer.interrupted}", err=True)
         raise typer.Exit(130)
@@ -43,20 +50,9 @@ def print_answer(answer: Answer, as_json: bool) -> None:
 
 def print_object(numbers: Mapping[str, Any], *, in_a_line: bool = False) -> None:
     """Print an object for programs, in ASCII; null stands for numbers that are not finite."""
-    import json
+    from tactile_bayes.tasks.documents import json_value
 
-    typer.echo(json.dumps(_plain(numbers), indent=None if in_a_line else 2, allow_nan=False))
-
-
-def _print_part(part: str | Table | Mapping[str, Path]) -> None:
-    if isinstance(part, str):
-        typer.echo(part)
-    elif isinstance(part, Mapping):
-        width = max(12, *map(len, part))
-        for what, path in part.items():
-            typer.echo(f"{what:<{width}} {path}")
-    else:
-        _print_table(part)
+    typer.echo(json.dumps(json_value(numbers), indent=None if in_a_line else 2, allow_nan=False))
 
 
 def _print_table(table: Table) -> None:
@@ -89,22 +85,12 @@ def text_of(value: float, form: str = ".1f") -> str:
 
 
 def columns_of(dataset: Any, dim: str) -> list[dict[str, Any]]:
-    """Return a row for every label of a dimension, with its coordinate and all variables along this dimension alone."""
+    """Return a row for every label of a dimension, with its coordinate and all variables along this dimension alone.
+
+    There are none without the dimension.
+    """
+    if dim not in dataset.dims:
+        return []
     columns = {dim: dataset[dim], **dataset.data_vars, **dataset.coords}
     table = {name: values.values for name, values in columns.items() if values.dims == (dim,)}
     return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
-
-
-def _plain(value: Any) -> Any:
-    """Return the value in types of JSON: no arrays, no paths, and null for numbers that are not finite."""
-    if hasattr(value, "items"):
-        return {str(name): _plain(part) for name, part in value.items()}
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "values"):  # of xarray
-        value = value.values
-    if hasattr(value, "tolist"):  # arrays and numbers of NumPy
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from contextlib import contextmanager
+import traceback
+import warnings
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -28,10 +30,11 @@ from tactile_bayes.cli.sensitivity import sensitivity
 from tactile_bayes.cli.streams import accept_every_text
 from tactile_bayes.cli.trust import trust
 from tactile_bayes.cli.watching import watch
+from tactile_bayes.errors import TactileBayesError, TactileBayesWarning
 from tactile_bayes.matplotlib_defaults import ignore_user_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from tactile_bayes.cli.answer import Answer
 
@@ -47,7 +50,8 @@ class _Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            with _warnings_in_a_line():
+            with warnings.catch_warnings():
+                warnings.showwarning = partial(_show_warning, warnings.showwarning)
                 return super().invoke(ctx)
         except (BrokenPipeError, typer.Exit, typer.Abort):  # the reader has closed the pipe, or a message was printed
             raise
@@ -58,8 +62,6 @@ class _Commands(TyperGroup):
                 raise
             words, code = _message(error)
             if ctx.params["debug"]:
-                import traceback
-
                 typer.echo(traceback.format_exc(), err=True)
             elif code == 1:
                 words += "\nRun it again as tactile-bayes --debug ... to see the traceback."
@@ -69,8 +71,6 @@ class _Commands(TyperGroup):
 
 def _message(error: Exception) -> tuple[str, int]:
     """Return the message and the exit code of an error."""
-    from tactile_bayes.errors import TactileBayesError
-
     if isinstance(error, TactileBayesError):
         return str(error), 2
     if isinstance(error, OSError):
@@ -80,26 +80,12 @@ def _message(error: Exception) -> tuple[str, int]:
     return f"unexpected error, {type(error).__name__}: {said}", 1
 
 
-@contextmanager
-def _warnings_in_a_line() -> Iterator[None]:
-    """Print warnings of this package as a line on stderr; warnings of other packages keep their form."""
-    import warnings
-
-    usual = warnings.showwarning
-
-    def show(message: Any, category: Any, *rest: Any, **more: Any) -> None:
-        from tactile_bayes.errors import TactileBayesWarning
-
-        if issubclass(category, TactileBayesWarning):
-            typer.echo(f"tactile-bayes: warning: {message}", err=True)
-        else:
-            usual(message, category, *rest, **more)
-
-    warnings.showwarning = show
-    try:
-        yield
-    finally:
-        warnings.showwarning = usual
+def _show_warning(usual: Callable[..., None], message: Any, category: Any, *rest: Any, **more: Any) -> None:
+    """Print a warning of this package as a line on stderr; warnings of other packages keep their form."""
+    if issubclass(category, TactileBayesWarning):
+        typer.echo(f"tactile-bayes: warning: {message}", err=True)
+    else:
+        usual(message, category, *rest, **more)
 
 
 _EXIT_CODES = """Exit codes: 0 for done, 1 for an unexpected error, 2 for input or options that are refused, 130 for

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from tactile_bayes.cli.numbers import assigned, numbers_asked
+from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +47,6 @@ class ContourOptions:
         import numpy as np
 
         from tactile_bayes.contours import from_points, paper_profile
-        from tactile_bayes.errors import ParameterError
         from tactile_bayes.planning.family_parameters import enlarged
         from tactile_bayes.record.points import read_points
 
@@ -86,7 +86,6 @@ class GaugeOptions:
 
 def _of_family(name: str, options: Sequence[str] | None) -> Contour:
     from tactile_bayes.contours.families import family_named
-    from tactile_bayes.errors import ParameterError
 
     family = family_named(name)
     if family.roughness:

@@ -10,6 +10,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output
+from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,7 +31,6 @@ def rig(
 
     Under [unknown] a number makes a parameter known, a distribution unknown, like friction = { half_normal = 0.3 }.
     """
-    from tactile_bayes.errors import ParameterError
     from tactile_bayes.rig import Rig
     from tactile_bayes.rig.parameters import PARAMETERS
 
@@ -41,7 +41,7 @@ def rig(
         return Answer(_listed(rows), lambda: {"parameters": rows})
     stated = Rig.read(path)
     said = _said(stated)
-    return Answer(_words(stated, said), lambda: _numbers(stated, said))
+    return Answer(_words(stated, said), lambda: {"rig": stated.tables, "known": stated.known, "said": said})
 
 
 # Units of the rod, by whether that is of a force, and powers of the moment's and the length's.
@@ -58,15 +58,8 @@ _UNITS = {
 
 
 def _row(parameter: Parameter) -> dict[str, Any]:
-    return {
-        "name": parameter.name,
-        "meaning": parameter.meaning,
-        "unit": parameter.unit,
-        "default": _default(parameter),
-        "low": parameter.low,
-        "high": parameter.high,
-        "hidden": parameter.hidden,
-    }
+    names = ("name", "meaning", "unit", "low", "high", "hidden")
+    return {name: getattr(parameter, name) for name in names} | {"default": _default(parameter)}
 
 
 def _listed(rows: list[dict[str, Any]]) -> Iterator[Any]:
@@ -161,7 +154,3 @@ def _words(rig: Rig, said: dict[str, str]) -> Iterator[Any]:
 def _list(entries: Any) -> str:
     texts = {name: f"{value:.6g}" if isinstance(value, float) else str(value) for name, value in entries.items()}
     return ", ".join(f"{name} = {text}" for name, text in texts.items())
-
-
-def _numbers(rig: Rig, said: dict[str, str]) -> dict[str, Any]:
-    return {"rig": rig.tables, "known": rig.known, "said": said}

@@ -13,6 +13,7 @@ from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.drive_options import CarryOptions, pivots_in
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar
 from tactile_bayes.cli.rig_options import RigFile
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.runs.names import DESIGN
 
 if TYPE_CHECKING:
@@ -57,7 +58,6 @@ def design(
     """
     import numpy as np
 
-    from tactile_bayes.errors import ParameterError
     from tactile_bayes.planning.design import usual_drives
     from tactile_bayes.runs.design import design_into
     from tactile_bayes.sweep import Rotation

@@ -11,6 +11,7 @@ import typer
 
 from tactile_bayes.cli.command import Reads
 from tactile_bayes.cli.numbers import numbers_asked
+from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,7 +61,6 @@ class DriveOptions(CarryOptions):
 
     def drives(self, base: Sequence[str] | None, direction: Directions = "both") -> list[Drive]:
         """Return rotations about pivots, the origin if there is no drive, then the drives that carry the base."""
-        from tactile_bayes.errors import ParameterError
         from tactile_bayes.sweep import Rotation
 
         if self.carry and not base:
@@ -78,8 +78,6 @@ class DriveOptions(CarryOptions):
 
 def rotation_step(step: float | None) -> float | None:
     """Return the step of rotations [rad] that is asked for in degrees; ParameterError if no rotation has it."""
-    from tactile_bayes.errors import ParameterError
-
     low, high = _STEPS
     if step is not None and not low <= step <= high:
         raise ParameterError(f"--drive-step is {step:g}: give a step of rotations from {low:g} to {high:g} degrees")

@@ -11,6 +11,7 @@ from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.drive_options import rotation_step
 from tactile_bayes.cli.progress import resumable_bar
 from tactile_bayes.cli.rig_options import NoiseOptions
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.runs.names import FIGURES
 
 
@@ -38,7 +39,6 @@ def figures(
 
     Numbers are in units of the rod (L, EI/L, EI/L²). Noise is that of the loads in figure 11, by default none.
     """
-    from tactile_bayes.errors import ParameterError
     from tactile_bayes.paper_figures import NUMBERS, caption, draw_all
     from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
     from tactile_bayes.tasks import TaskProgress

@@ -12,6 +12,7 @@ from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.numbers import assigned
 from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import Record, RigOptions
+from tactile_bayes.errors import RecordWarning
 from tactile_bayes.runs.names import INSPECTION
 
 if TYPE_CHECKING:
@@ -92,21 +93,21 @@ def inspect(
         import warnings
 
         from tactile_bayes.diagnostics.inspection import inspect_record
-        from tactile_bayes.errors import RecordWarning
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RecordWarning)  # they are among the contents
             measured, of_record = rig.read(record)
         found = inspect_record(measured, of_record, progress=show)
         beside = _beside(measured)
-        contents = [*_contents(found, of_record.format.columns), *(f"{name:<12}{text}" for name, text in beside)]
+        texts = (f"{name.replace('_', ' '):<12}{text}" for name, several in beside.items() for text in several)
+        contents = [*_contents(found, of_record.format.columns), *texts]
         files: Mapping[str, Path] = {}
         if out is not None:
             from tactile_bayes.runs.inspection import write_inspection
 
             files = write_inspection(found, out, text=["", *contents], rig=_to_write(of_record, rig))
     again = _next_command(record, rig, out)
-    return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files) | _texts(beside))
+    return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files) | beside)
 
 
 def _words(found: Inspection, contents: list[str], again: str, files: Mapping[str, Path]) -> Iterator[Any]:
@@ -120,18 +121,15 @@ def _words(found: Inspection, contents: list[str], again: str, files: Mapping[st
     yield from ("", f"{'Once that is corrected' if found.is_suspect else 'Next'}: {again}")
 
 
-def _beside(record: xr.Dataset) -> list[tuple[str, str]]:
+def _beside(record: xr.Dataset) -> dict[str, list[str]]:
     """Return what was assumed as the file was read, and what of it has no meaning here."""
     from tactile_bayes.record.attribute_names import unused
 
-    notes = [("reading", note) for note in record.encoding["notes"]]
-    return notes + [
-        ("not used", text) for text in [", ".join(unused(record.attrs)), *record.encoding["remarks"]] if text
-    ]
-
-
-def _texts(beside: list[tuple[str, str]]) -> dict[str, list[str]]:
-    return {key: [text for name, text in beside if name == key.replace("_", " ")] for key in ("reading", "not_used")}
+    attributes = ", ".join(unused(record.attrs))
+    return {
+        "reading": list(record.encoding["notes"]),
+        "not_used": [text for text in (attributes, *record.encoding["remarks"]) if text],
+    }
 
 
 def _to_write(rig: Rig, options: _FileOptions) -> Rig:
@@ -212,16 +210,10 @@ def _sweeps(sweeps: xr.Dataset) -> Table:
             along = (_travel(float(row[name]), unit) for name in ("travel", "travel_step"))
             moves = [f"{words} {text}" for words, text in zip(("carried", "by"), along, strict=True)]
             ends = [_travel(float(row[f"{name}_travel"].mean(skipna=False)), unit) for name in ("onset", "snap_off")]
-        rows.append(
-            [
-                f"{number} {row.direction.values}",
-                *([pivots[i]] if with_pivots else []),
-                str(int(row.samples)),
-                *moves,
-                *(ends if bool(row.contact) else ["never", "–"]),
-                str(int(row.unloaded)),
-            ]
-        )
+        pivot = [pivots[i]] if with_pivots else []
+        ends = ends if bool(row.contact) else ["never", "–"]
+        samples, unloaded = str(int(row.samples)), str(int(row.unloaded))
+        rows.append([f"{number} {row.direction.values}", *pivot, samples, *moves, *ends, unloaded])
     drive = "drive [°]" if "carried" not in sweeps else "drive [°], or travel"
     heads = ["sweep", *([base] if with_pivots else []), "samples", drive, "step", "touches", "lets go"]
     return table_of([*heads, "unloaded"], rows, left=["sweep"])
@@ -259,14 +251,10 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
 
     record = found.record
     sweeps = columns_of(found.sweeps, "sweep")
-    for row, onset, snap in zip(
-        sweeps, found.sweeps.onset_drive_angle.values, found.sweeps.snap_off_drive_angle.values, strict=True
-    ):
-        row |= {"onset_drive_angle": onset, "snap_off_drive_angle": snap}
-    for name in ("onset_travel", "snap_off_travel"):
-        if name in found.sweeps:
-            for row, beside in zip(sweeps, found.sweeps[name].values, strict=True):
-                row[name] = beside
+    for name, values in found.sweeps.data_vars.items():
+        if values.dims == ("sweep", "side"):
+            for row, sides in zip(sweeps, values.values, strict=True):
+                row[str(name)] = sides
     return {
         "words": found.messages,
         "is_suspect": found.is_suspect,

@@ -13,6 +13,7 @@ from tactile_bayes.cli.command import Output, Seed
 from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import NoiseOptions, RigFile
 from tactile_bayes.cli.scanning import RecordFile, refuse_other_suffix
+from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +36,6 @@ def measure(
     have noise twice; a record without one is assumed to be ideal.
     """
     refuse_other_suffix(out)
-    from tactile_bayes.errors import ParameterError
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.record import write_record
     from tactile_bayes.rig import read_record

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tactile_bayes.errors import ParameterError
+
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
 
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
     """Parse a given number of numbers, with commas between them."""
-    from tactile_bayes.errors import ParameterError
     from tactile_bayes.record.spelling import plain_number
 
     try:
@@ -44,8 +45,6 @@ def assigned(
     option: str, texts: Sequence[str] | None, form: str = "", *, known: Collection[str] = ()
 ) -> dict[str, str]:
     """Parse the values of a repeated option NAME=VALUE, by name."""
-    from tactile_bayes.errors import ParameterError
-
     values: dict[str, str] = {}
     like = form or f"NAME=VALUE, with one of {', '.join(known)}"
     for text in texts or []:

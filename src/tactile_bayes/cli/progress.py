@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from tactile_bayes.cli.interrupts import resumable
+from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -36,7 +37,6 @@ class WorkerOptions:
 
     def reporting(self, progress: Callable[[TaskProgress], object]) -> Workers:
         """Return the workers, of which a function hears."""
-        from tactile_bayes.errors import ParameterError
         from tactile_bayes.tasks import Workers
 
         if self.workers is None or "://" in self.workers:
@@ -71,7 +71,7 @@ def resumable_bar(
         return f"{last.done:,} of {counted(last.wanted, noun)} are in {where}"
 
     at_first = "beginning" if total is None else f"{counted(total, noun)} to be made"
-    with resumable(have, then=then) as raise_lost, step_bar(quiet, noun, at_first, has_rate=True) as show:
+    with resumable(have, then) as raise_lost, step_bar(quiet, noun, at_first, has_rate=True) as show:
 
         def note(progress: TaskProgress) -> None:
             nonlocal last

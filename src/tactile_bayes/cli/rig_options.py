@@ -6,17 +6,17 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tactile_bayes.cli.command import Reads
+from tactile_bayes.errors import ParameterError, TactileBayesError
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.rig import Rig
 
 Record = Annotated[Path, "Record, .csv or .nc, or a bag of ROS.", typer.Argument()]
@@ -28,7 +28,6 @@ class _ReadsRig(Reads):
     def files(self, path: Path) -> Iterator[Path]:
         """Yield both, if they are there."""
         yield path
-        from tactile_bayes.errors import TactileBayesError
         from tactile_bayes.tasks.documents import read_toml
 
         with suppress(OSError, ValueError, TactileBayesError):  # whoever reads the file reports it
@@ -50,29 +49,11 @@ class RigFile:
     ] = None
 
     @property
-    def of_file(self) -> Rig:
-        """The rig as the file states it; without a file, one that says nothing."""
+    def stated(self) -> Rig:
+        """The rig as file and options state it, apart from its noise; without a file, one that says nothing."""
         from tactile_bayes.rig import Rig
 
         return Rig() if self.rig is None else Rig.read(self.rig)
-
-    @property
-    def stated(self) -> Rig:
-        """The rig as file and options state it, apart from its noise."""
-        return self.of_file
-
-    def read(self, path: Path) -> tuple[xr.Dataset, Rig]:
-        """Read a record, and return it with its rig; report assumed units."""
-        from tactile_bayes.rig import read_record
-
-        rig = self.stated
-        record = read_record(path, rig)
-        report_units(record)
-        return record, self._for(record, rig.without_bare_cell)
-
-    def _for(self, record: xr.Dataset, rig: Rig) -> Rig:
-        """Return the rig of a record."""
-        return rig
 
 
 def report_units(record: xr.Dataset) -> None:
@@ -114,17 +95,34 @@ class RigOptions(NoiseOptions, RigFile):
     @property
     def stated(self) -> Rig:
         """The rig as file and options state it, apart from its noise."""
-        rig = self.of_file
-        return replace(rig, rod=self._rod(rig.rod))
+        from tactile_bayes.mechanics.rods.rod import Rod
 
-    def _for(self, record: xr.Dataset, rig: Rig) -> Rig:
-        """Return the rig of a record, with the noise that is given."""
-        from tactile_bayes.errors import ParameterError
+        rig = super().stated
+        named = ((name, getattr(self, name)) for name in ("length", "flexural_rigidity", "diameter"))
+        given = {name: value for name, value in named if value is not None}
+        if not given:
+            return rig
+        if rig.rod is None or rig.rod.is_dimensionless:
+            if (self.length is None) != (self.flexural_rigidity is None):
+                raise ParameterError(
+                    "--length and --flexural-rigidity go together where no rig.toml states the rod: give both, or "
+                    "neither"
+                )
+            if self.length is None:
+                raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
+        return replace(rig, rod=replace(rig.rod or Rod(), **given))
+
+    def read(self, path: Path) -> tuple[xr.Dataset, Rig]:
+        """Read a record, and return it with its rig and the noise that is given; report assumed units."""
         from tactile_bayes.load_cell import LoadCell
         from tactile_bayes.record import present_channels
+        from tactile_bayes.rig import read_record
 
+        stated = self.stated
+        record, rig = read_record(path, stated), stated.without_bare_cell
+        report_units(record)
         if self.force_noise is None and self.moment_noise is None:
-            return rig
+            return record, rig
         cell = self.in_place_of(rig.load_cell or LoadCell.from_record(record))
         assert cell is not None
         bare = [name for name in present_channels(record) if not cell.standard_deviations[name]]
@@ -133,26 +131,4 @@ class RigOptions(NoiseOptions, RigFile):
             raise ParameterError(
                 f"{bare[0]} is measured too: give {option} as well, above zero, or leave both out to have them inferred"
             )
-        return replace(rig, load_cell=cell)
-
-    def _rod(self, rod: Rod | None) -> Rod | None:
-        """Return the rod of the file with the numbers that are given."""
-        from tactile_bayes.errors import ParameterError
-        from tactile_bayes.mechanics.rods.rod import Rod
-
-        given: dict[str, Any] = {
-            name: value
-            for name in ("length", "flexural_rigidity", "diameter")
-            if (value := getattr(self, name)) is not None
-        }
-        if not given:
-            return rod
-        if rod is None or rod.is_dimensionless:
-            if (self.length is None) != (self.flexural_rigidity is None):
-                raise ParameterError(
-                    "--length and --flexural-rigidity go together where no rig.toml states the rod: give both, or "
-                    "neither"
-                )
-            if self.length is None:
-                raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
-        return replace(rod or Rod(), **given)
+        return record, replace(rig, load_cell=cell)

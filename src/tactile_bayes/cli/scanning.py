@@ -12,6 +12,7 @@ from tactile_bayes.cli.contour_options import ContourOptions
 from tactile_bayes.cli.drive_options import Directions, DriveOptions, Pivots
 from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import RigFile
+from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -66,8 +67,6 @@ def scan(
 
 def refuse_other_suffix(path: Path, known: tuple[str, ...] = (".csv", ".nc"), what: str = "a record") -> None:
     """Refuse a file with another suffix, or below another file, before anything is computed."""
-    from tactile_bayes.errors import ParameterError
-
     if path.suffix not in known:
         kinds = f"{', '.join(known[:-1])} or {known[-1]}"
         raise ParameterError(f"{path}: {what} is a {kinds} file, so give a name with that ending")
@@ -96,17 +95,13 @@ def _table(made: Scan, rod: Rod) -> Table:
     carried = carried_sweeps(made.record)
     rows = []
     for number, sweep in enumerate(made.sweeps):
-        for event in (sweep.first_contact, *sweep.transitions, sweep.snap_off):
+        named = [(f"{number} {sweep.direction}", f"first contact ({sweep.first_contact.kind})", sweep.first_contact)]
+        named += [("", change.kind, change) for change in sweep.transitions]
+        for sweeping, name, event in [*named, ("", _ending(sweep.snap_off), sweep.snap_off)]:
             size = math.hypot(event.force_x, event.force_y)
             values = (scale * v for v in (event.contact_x, event.contact_y, event.holding_moment, size))
             travel = [_fixed(scale * event.travel) if number in carried else ""] if carried else []
-            numbers = [*travel, f"{math.degrees(event.drive_angle):.3f}", *map(_fixed, values)]
-            sweeping, name = "", event.kind
-            if event is sweep.first_contact:
-                sweeping, name = f"{number} {sweep.direction}", f"first contact ({name})"
-            elif event is sweep.snap_off:
-                name = _ending(event)
-            rows.append([sweeping, name, *numbers])
+            rows.append([sweeping, name, *travel, f"{math.degrees(event.drive_angle):.3f}", *map(_fixed, values)])
     travel = [f"travel{length or ' [L]'}"] if carried else []
     heads = ["sweep", "event", *travel, "at [°]", f"x{length}", f"y{length}", f"m0{moment}", f"force{force}"]
     return table_of(heads, rows, left=["sweep", "event"])
@@ -134,19 +129,7 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
         "rod": asdict(rod),
         "samples": made.record.sizes["sample"],
         "sweeps": [
-            {
-                "sweep": number,
-                "direction": sweep.direction,
-                "base": sweep.base,
-                "carried": number in carried,
-                "clear": sweep.clear,
-                "touches_again": sweep.touches_again,
-                "largest_strain": sweep.largest_strain,
-                "first_contact": asdict(sweep.first_contact),
-                "transitions": [asdict(change) for change in sweep.transitions],
-                "snap_off": asdict(sweep.snap_off),
-            }
-            for number, sweep in enumerate(made.sweeps)
+            {"sweep": number, "carried": number in carried, **asdict(sweep)} for number, sweep in enumerate(made.sweeps)
         ],
         "files": files,
     }

@@ -13,6 +13,7 @@ from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.drive_options import Pivots, pivots_in
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, step_bar
 from tactile_bayes.cli.rig_options import RigFile
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.runs.names import SENSITIVITY
 
 if TYPE_CHECKING:
@@ -112,8 +113,6 @@ def sensitivity(
 def _refuse_without_study(
     profiles: Sequence[str], distances: Sequence[float], factors: Sequence[float] | None, work: WorkerOptions
 ) -> None:
-    from tactile_bayes.errors import ParameterError
-
     given = {
         "more than one --profile": len(profiles) > 1,
         "more than one --distance": len(distances) > 1,
@@ -127,7 +126,6 @@ def _refuse_without_study(
 
 def _material(rig: Rig) -> Material:
     """Return the material of a rig's rod, of Young's modulus EI / (π d⁴ / 64)."""
-    from tactile_bayes.errors import ParameterError
     from tactile_bayes.mechanics.rods.rod import round_rigidity
     from tactile_bayes.runs.sensitivity import Material
 

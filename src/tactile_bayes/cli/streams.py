@@ -11,37 +11,13 @@ _HANDLER = "tactile_bayes.stand_in"
 
 # Name of ASCII for streams, under which Typer does not take it for a mistake and write UTF-8.
 _ASCII = "tactile_bayes_ascii"
-_STAND_INS = {
-    "\N{COMBINING CIRCUMFLEX ACCENT}": "^",
-    "\N{MINUS SIGN}": "-",
-    "\N{EN DASH}": "-",
-    "\N{EM DASH}": "-",
-    "\N{BULLET}": "*",
-    "\N{DEGREE SIGN}": "deg",
-    "\N{PLUS-MINUS SIGN}": "+/-",
-    "\N{MULTIPLICATION SIGN}": "x",
-    "\N{MIDDLE DOT}": ".",
-    "\N{DOT OPERATOR}": ".",
-    "\N{FRACTION SLASH}": "/",
-    "\N{SQUARE ROOT}": "sqrt",
-    "\N{INFINITY}": "inf",
-    "\N{PARTIAL DIFFERENTIAL}": "d",
-    "\N{INTEGRAL}": "int",
-    "\N{PRIME}": "'",
-    "\N{LESS-THAN OR EQUAL TO}": "<=",
-    "\N{GREATER-THAN OR EQUAL TO}": ">=",
-    "\N{NOT EQUAL TO}": "!=",
-    "\N{ALMOST EQUAL TO}": "~",
-    "\N{ELEMENT OF}": "in",
-    "\N{RIGHTWARDS ARROW}": "->",
-    "\N{LONG RIGHTWARDS DOUBLE ARROW}": "=>",
-    "\N{LEFT SINGLE QUOTATION MARK}": "'",
-    "\N{RIGHT SINGLE QUOTATION MARK}": "'",
-    "\N{LEFT DOUBLE QUOTATION MARK}": '"',
-    "\N{RIGHT DOUBLE QUOTATION MARK}": '"',
-    "\N{MICRO SIGN}": "u",
-    "\N{GREEK SMALL LETTER MU}": "u",
-}
+# Characters, each before its stand-in.
+_PAIRS = """
+− - – - — - • * ° deg ± +/- × x · . ⋅ . ⁄ / √ sqrt ∞ inf ∂ d ∫ int ′ ' ≤ <= ≥ >= ≠ != ≈ ~ ∈ in → -> ⟹ =>
+‘ ' ’ ' “ " ” " \N{MICRO SIGN} u \N{GREEK SMALL LETTER MU} u \N{COMBINING CIRCUMFLEX ACCENT} ^
+"""
+_WORDS = _PAIRS.split()
+_STAND_INS = dict(zip(_WORDS[::2], _WORDS[1::2], strict=True))
 
 
 def accept_every_text() -> None:
@@ -58,15 +34,7 @@ def _ascii_codec(name: str) -> codecs.CodecInfo | None:
     if name != _ASCII:
         return None
     known = codecs.lookup("ascii")
-    return codecs.CodecInfo(
-        known.encode,
-        known.decode,
-        known.streamreader,
-        known.streamwriter,
-        known.incrementalencoder,
-        known.incrementaldecoder,
-        name=_ASCII,
-    )
+    return codecs.CodecInfo(*known, known.incrementalencoder, known.incrementaldecoder, _ASCII)
 
 
 def _encoded_by_stand_ins(error: UnicodeError) -> tuple[str, int]:

@@ -57,13 +57,10 @@ def trust(
         lambda: {
             "words": words,
             **{name: found.attrs[name] for name in names},
-            "split_p_value": float(found["split_p_value"]),
-            "check_p_value": float(found["check_p_value"]),
+            **{name: float(found[name]) for name in ("split_p_value", "check_p_value")},
             "parts": columns_of(found, "part"),
             "quantities": columns_of(found, "quantity"),
-            "claims": columns_of(found, "claim") if "claim" in found.dims else [],
-            "regions": columns_of(found, "region") if "region" in found.dims else [],
-            "assumptions": columns_of(found, "assumption") if "assumption" in found.dims else [],
+            **{f"{dim}s": columns_of(found, dim) for dim in ("claim", "region", "assumption")},
             "draws_needed": int(found["draws_needed"]),
             "files": made.files,
         },
@@ -72,12 +69,8 @@ def trust(
 
 def _table(found: xr.Dataset) -> Table:
     """Return the sensitivities of parameters and bands."""
-    rows = [
-        (str(name), *(f"{value:.3f}" for value in row), str(by))
-        for name, row, by in zip(
-            found["quantity"].values, found["sensitivity"].values, found["set_by"].values, strict=True
-        )
-    ]
+    columns = (found[name].values for name in ("quantity", "sensitivity", "set_by"))
+    rows = [(str(name), *(f"{value:.3f}" for value in row), str(by)) for name, row, by in zip(*columns, strict=True)]
     heads = ["sensitivity of", *(f"to {_NAMES[str(name)]}" for name in found["component"].values), "set by"]
     return table_of(heads, rows, left=["sensitivity of", "set by"])
 
@@ -86,16 +79,12 @@ def _assumptions(found: xr.Dataset) -> list[Table | str]:
     """Return how far the median of the band moves under other assumptions."""
     if "assumption" not in found.dims:
         return []
-    rows = [
-        (row["assumption"], text_of(row["moved_in_gap"], ".2f"), text_of(row["moved_beside"], ".2f"), _yes(row["fits"]))
-        for row in columns_of(found, "assumption")
-    ]
+    rows = []
+    for row in columns_of(found, "assumption"):
+        moved = (text_of(row[name], ".2f") for name in ("moved_in_gap", "moved_beside"))
+        rows.append((row["assumption"], *moved, "yes" if row["fits"] else "no"))
     heads = ["assumption instead", "moves in the gap", "beside it [band widths]", "fits"]
     return [table_of(heads, rows, left=["assumption instead", "fits"]), ""]
-
-
-def _yes(value: int) -> str:
-    return "yes" if value else "no"
 
 
 _NAMES = {"contour": "the contour's prior", "rig": "the rig's prior", "likelihood": "the record"}

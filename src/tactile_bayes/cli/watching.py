@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +17,7 @@ from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.rig_options import RigFile, report_units
+from tactile_bayes.errors import InferenceError, ParameterError, TactileBayesError
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
 
 if TYPE_CHECKING:
@@ -81,7 +83,6 @@ def watch(
     itself again; at the end, which is no error, all that infer writes. With --json there is one object in each line:
     of each update, and of the end.
     """
-    from tactile_bayes.errors import ParameterError
     from tactile_bayes.rig import GrowingRecord
     from tactile_bayes.runs.watch import open_watch
 
@@ -154,8 +155,6 @@ class _Follower:
         typer.echo(f"tactile-bayes: warning: {message}", err=True)
 
     def _take(self, growth: Growth) -> None:
-        from tactile_bayes.errors import ParameterError, TactileBayesError
-
         for message in growth.messages:
             self.tell(message)
         if growth.is_other:
@@ -194,6 +193,21 @@ class _Follower:
         every_before, self.last = self.last.every if self.last else 1, update
         now = time.time()
         behind = max(0.0, now - growth.written_at)
+        self._warn(update, every_before)
+        headline, families, band = _counted(update, self.is_late), _families(update), _band(update)
+        late = f"The answer is {behind:.1f} s behind its newest sample."
+        words = [*families, f"{sentence(band)}.", late, *(f"{message}." for message in self.messages)]
+        self.write_page(headline, words, is_well=not self.messages)
+        if self.output.json:
+            print_object(self._numbers(update, now, behind), in_a_line=True)
+        elif not self.output.quiet:
+            typer.echo(f"{headline}; {band}; {behind:.1f} s behind")
+            for line in [*families, _parameters(update)]:
+                typer.echo(f"    {line}")
+        self.messages.clear()
+
+    def _warn(self, update: WatchUpdate, every_before: int) -> None:
+        """Warn of what an answer cannot be trusted for, once."""
         count, parameters = update.posterior["posterior"].sizes["draw"], update.summary.sizes["quantity"]
         if self.parameters < parameters and count < _PER_PARAMETER * parameters:
             self.tell(
@@ -215,23 +229,6 @@ class _Follower:
                 "band, and try another --family, or infer more of the rig ([unknown] of rig.toml)"
             )
         self.e_value = max(self.e_value, update.e_value)
-        words = [
-            *_families(update),
-            f"{sentence(_band(update))}.",
-            f"The answer is {behind:.1f} s behind its newest sample.",
-        ]
-        self.write_page(
-            _counted(update, self.is_late),
-            [*words, *(f"{message}." for message in self.messages)],
-            is_well=not self.messages,
-        )
-        if self.output.json:
-            print_object(self._numbers(update, now, behind), in_a_line=True)
-        elif not self.output.quiet:
-            typer.echo(f"{_counted(update, self.is_late)}; {_band(update)}; {behind:.1f} s behind")
-            for line in [*_families(update), _parameters(update)]:
-                typer.echo(f"    {line}")
-        self.messages.clear()
 
     def write_page(self, headline: str, sentences: Sequence[str], *, is_well: bool, is_last: bool = False) -> None:
         """Write the page of the last answer."""
@@ -250,23 +247,16 @@ class _Follower:
         )
 
     def _numbers(self, update: WatchUpdate, now: float, behind: float) -> dict[str, Any]:
-        from datetime import datetime
-
         return {
             "event": "update",
             "time": datetime.fromtimestamp(now).astimezone().isoformat(timespec="milliseconds"),
-            "samples": update.samples,
-            "new": update.new,
+            **{name: getattr(update, name) for name in ("samples", "new", "restarted", "every", "seconds", "e_value")},
             "taken_together": self.is_late,
-            "restarted": update.restarted,
-            "every": update.every,
-            "seconds": update.seconds,
             "seconds_behind": behind,
             "probability": update.summary.attrs["probability"],
             "quantities": columns_of(update.summary, "quantity"),
             "band_width": update.width,
             "probabilities": dict(update.probabilities),
-            "e_value": update.e_value,
             "may_stop": bool(update.enough),
             "converged": bool(update.posterior.attrs["converged"]),
             "message": update.posterior.attrs["message"],
@@ -276,7 +266,6 @@ class _Follower:
 
 def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
     """Return the last answer, with the files of a run."""
-    from tactile_bayes.errors import InferenceError
     from tactile_bayes.report.wording import sentence
 
     last = follower.last
@@ -319,10 +308,8 @@ def _families(update: WatchUpdate) -> list[str]:
     in_order = sorted(update.probabilities.items(), key=lambda item: -item[1])
     shares = [f"{name} {'<' if p < _RARE else ''}{percent(max(round(p, 3), _RARE))}" for name, p in in_order]
     probable = ", ".join(shares)
-    if update.underrated:
-        probable += (
-            f"; too small for {', '.join(update.underrated)}: their particles had lost the posterior for a while"
-        )
+    if small := ", ".join(update.underrated):
+        probable += f"; too small for {small}: their particles had lost the posterior for a while"
     return [f"Probability of the shapes: {probable}; parameters are those of the first, the band is averaged."]
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,6 +42,21 @@ def read_json(text: Any, name: str) -> Any:
         if isinstance(error, ParameterError):
             raise
         raise ParameterError(f"{name} is {shown(text)}, no JSON text that can be read: {error}") from error
+
+
+def json_value(value: Any) -> Any:
+    """Return a value in types of JSON: no arrays, no paths, and null for numbers that are not finite."""
+    if hasattr(value, "items"):
+        return {str(name): json_value(part) for name, part in value.items()}
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "values"):  # of xarray
+        value = value.values
+    if hasattr(value, "tolist"):  # arrays and numbers of NumPy
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [json_value(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def read_toml(text: str) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +12,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from tactile_bayes.checks import check_path
 from tactile_bayes.errors import TactileBayesError
-from tactile_bayes.tasks.documents import read_json
+from tactile_bayes.tasks.documents import json_value, read_json
 from tactile_bayes.tasks.files import alone_in, write_atomically
 from tactile_bayes.tasks.workers import TaskProgress, Workers, run_tasks, workers_of
 
@@ -58,7 +57,7 @@ class ResultsStore(Generic[Outcome]):
         rows = [{"number": number, **self._kind.encode(outcome)} for number, outcome in sorted(self.outcomes.items())]
         table = {"format": _FORMAT, "experiment": self._identity, self._kind.what: rows}
         with write_atomically(self._file) as temporary:
-            temporary.write_text(json.dumps(_storable(table), ensure_ascii=False, allow_nan=False), encoding="utf-8")
+            temporary.write_text(json.dumps(json_value(table), ensure_ascii=False, allow_nan=False), encoding="utf-8")
 
 
 @contextmanager
@@ -125,15 +124,6 @@ def differences(there: Mapping[str, str], here: Mapping[str, str]) -> str:
     parts = ((name, *_differing(there.get(name), here.get(name))) for name in differ[:3])
     named = ", ".join(f"{name} is {had} there and {has} here" for name, had, has in parts)
     return named + (f" and {len(differ) - 3} more" if len(differ) > 3 else "")
-
-
-def _storable(value: Any) -> Any:
-    """Convert a value to types of JSON: null for numbers that are not finite, and lists for tuples."""
-    if isinstance(value, Mapping):
-        return {name: _storable(part) for name, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_storable(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _differing(there: Any, here: Any) -> tuple[str, ...]:
