@@ -158,7 +158,7 @@ WRITERS = {
     "checkpoint": write_states,
     "data set": lambda folder, k: datasets.generate(SPEC, folder, workers=1) if k else None,
     "infer": lambda folder, k: contour.complete(tree(k), record(k), folder),
-    "inspect": lambda folder, k: inspection.write_inspection(INSPECTIONS[k], folder),
+    "inspect": lambda folder, k: inspection.write_inspection(INSPECTIONS[k], folder, rig=Rig()),
     "compare": lambda folder, k: comparison.write_comparison(data(k), folder),
     "calibrate-rig": lambda folder, k: rig.calibrate_rig_into(
         folder, [(None, None)], contour=Parabola(0.5, 0.5), rig=Rig()

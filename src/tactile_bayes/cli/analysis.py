@@ -97,9 +97,10 @@ def _analysed(
     """Analyse a record with a bar; an interrupt ends the sampling, and is answered."""
     from tactile_bayes.runs.contour import analyse
 
-    options["command"] = ctx.meta["words"]
     with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent, max_seconds=max_seconds) as progress:
-        return analyse(*arguments, progress=progress, follow=None if progress is None else progress.follow, **options)
+        if progress is not None:
+            options |= {"progress": progress, "follow": progress.follow}
+        return analyse(*arguments, command=ctx.meta["words"], **options)
 
 
 def _of_many(paths: Sequence[Path], rig: RigOptions, out: Path, output: Output, options: dict[str, Any]) -> Answer:

@@ -86,8 +86,6 @@ def watch(
     from tactile_bayes.rig import GrowingRecord
     from tactile_bayes.runs.watch import open_watch
 
-    if until_width is not None and between is None:
-        raise ParameterError("--until-width is for a stretch of the contour: give its ends, like --between -0.02,0.02")
     stated = rig.stated
     growing = GrowingRecord(record, stated)
     with open_watch(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -32,9 +31,6 @@ def compare_into(
 ) -> Run[xr.Dataset]:
     """Compare families of contours, and write the result to a folder."""
     path = Path(out)
-    above = next(place for place in (path, *path.absolute().parents) if place.exists())
-    if not above.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
 
     def note(name: str, done: Progress) -> None:
         path.mkdir(parents=True, exist_ok=True)  # now: all options are checked, and sampling may take hours

@@ -35,7 +35,7 @@ from tactile_bayes.rig.parameters import COMPLIANCES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import rod_with
 from tactile_bayes.runs.folder import Folder, panels
-from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH_PAGE
+from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, PICTURES, WATCH_PAGE
 from tactile_bayes.sweep import Scan, recorded_drives, scan
 from tactile_bayes.tasks import refuse_replacing, replace_together
 from tactile_bayes.tasks.documents import read_json
@@ -45,15 +45,9 @@ from tactile_bayes.uncertainty.rod_reach import reach
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 _POSTERIOR = "posterior.nc"
-
 _MOST_PARAMETERS = 5  # largest number of parameters in a figure, unless a contour has more
 
-
 Follow = Callable[[str], object]
-
-
-def _unseen(what: str) -> None:
-    """Show no progress."""
 
 
 @dataclass(frozen=True)
@@ -94,16 +88,11 @@ class RunFolder(Folder):
             self.left_out[what] = error
             (self._new / name).unlink(missing_ok=True)
 
-    def write_posterior(self, posterior: xr.DataTree, *others: str) -> None:
-        """Write the posterior into the folder at once, and remove what belongs to a former one; others, too."""
-        with replace_together(self.path, [*INFERENCE, *OF_POSTERIOR, *others]) as temporary:
+    def write_posterior(self, posterior: xr.DataTree, names: Sequence[str] = (*INFERENCE, *OF_POSTERIOR)) -> None:
+        """Write the posterior at once in place of files of these names, by default of all that belong to another."""
+        with replace_together(self.path, names) as temporary:
             write_result(posterior, temporary / _POSTERIOR)
         self.files["posterior"] = self.path / _POSTERIOR
-
-    def replace_posterior(self, posterior: xr.DataTree) -> None:
-        """Write the posterior again, with a further group, and nothing else."""
-        with replace_together(self.path, [_POSTERIOR]) as temporary:
-            write_result(posterior, temporary / _POSTERIOR)
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -132,7 +121,7 @@ def analyse(
     record_file: str | os.PathLike[str] | None = None,
     command: Sequence[str] = (),
     figures: bool = True,
-    follow: Follow | None = None,
+    follow: Follow = lambda what: None,
     **options: Any,
 ) -> ContourRun:
     """Write contact points, contour posterior, band and, if asked for, figures of a record to a folder.
@@ -146,15 +135,15 @@ def analyse(
     options["family"], rig = family_of(options.get("family", "parabola")), rig_of(rig)
     measured = with_rod(validate(measured), rig.rod)
     origin = origin_of(measured, probability, command)
+    written = (*INFERENCE, *OF_POSTERIOR, WATCH_PAGE)
     if record_file is not None:
-        written = (*INFERENCE, *OF_POSTERIOR, WATCH_PAGE)
         refuse_replacing((Path(out) / name for name in written), [Path(record_file)])
         origin |= file_of(record_file, hashlib.sha256(Path(record_file).read_bytes()).hexdigest())
     folder, drawn = RunFolder(out), list[xr.DataTree]()
 
     def keep(posterior: xr.DataTree) -> None:
         posterior.attrs |= origin
-        folder.write_posterior(posterior, WATCH_PAGE)
+        folder.write_posterior(posterior, written)
         drawn.append(posterior)
 
     try:
@@ -165,7 +154,7 @@ def analyse(
         if not drawn:
             raise
         folder.left_out["predictions"] = error
-    return _completed(folder, measured, rig, drawn[-1], probability, truth, figures, follow or _unseen)
+    return _completed(folder, measured, rig, drawn[-1], probability, truth, figures, follow)
 
 
 def complete(
@@ -190,7 +179,7 @@ def _completed(
     probability: float,
     truth: Contour | None = None,
     figures: bool = True,
-    follow: Follow = _unseen,
+    follow: Follow = lambda what: None,
 ) -> ContourRun:
     """Write what follows from the posterior in a folder, of a long record by the samples that the likelihood took."""
     if "blocks" in result.attrs:
@@ -213,7 +202,7 @@ def _completed(
             follow("what may be wrong, a second or two each")
             with folder.attempt("causes", "causes"):
                 result["causes"] = xr.DataTree(causes(result, rng=0))
-                folder.replace_posterior(result)
+                folder.write_posterior(result, [_POSTERIOR])
                 checked = check(result, contacts)
         numbers = summary(result, probability, edges)
         found = () if checked is None else checked.messages
@@ -231,9 +220,8 @@ def _completed(
             _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
         if len(folder.left_out) > before:
             write_summary()
-        return ContourRun(
-            result, contacts, band, numbers, checked, (*found, *folder.messages), folder.files, folder.left_out
-        )
+        said = (*found, *folder.messages)
+        return ContourRun(result, contacts, band, numbers, checked, said, folder.files, folder.left_out)
 
 
 def origin_of(measured: xr.Dataset, probability: float, command: Sequence[str]) -> dict[str, Any]:
@@ -255,7 +243,7 @@ def file_of(path: str | os.PathLike[str], sha256: str) -> dict[str, Any]:
 
 
 def _draw(figures: _Figures, folder: RunFolder) -> None:
-    for name in ("predictive", "rods", "contour", "gap", "trace", "pairs"):
+    for name in PICTURES:
         if name != "gap" or figures.edges is not None:
             with folder.attempt(f"figure {name}", f"{name}.png"):
                 folder.draw(name, f"{name}.png", getattr(figures, name))

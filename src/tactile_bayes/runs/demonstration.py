@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -34,50 +36,37 @@ def measure_demo(out: str | os.PathLike[str], *, rng: Rng) -> tuple[Path, Path]:
     """Sweep forward and backward in steps of 1°, and write record.csv, without the truth, and rig.toml."""
     measured = LOAD_CELL.measure(scan(CONTOUR, Rig(rod=ROD)).record, rng=rng)
     path, rig = Path(out) / "record.csv", Path(out) / "rig.toml"
-    _refuse_another_record(path)
-    _refuse_another_rig(rig)
+    _refuse_another(path, _is_record)
+    _refuse_another(rig, lambda path: Rig.read(path).text == RIG.text)
     path.parent.mkdir(parents=True, exist_ok=True)
     measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
-    with replace_together(
-        path.parent, [*INFERENCE, *OF_POSTERIOR, path.name, rig.name]
-    ) as temporary:  # the run is of another record
+    # A run that is there is of another record.
+    with replace_together(path.parent, [*INFERENCE, *OF_POSTERIOR, path.name, rig.name]) as temporary:
         write_record(measured, temporary / path.name)
         RIG.write(temporary / rig.name)
     return path, rig
 
 
-def _refuse_another_record(path: Path) -> None:
-    """Refuse to replace a record that differs from those of the demonstration in more than its noise."""
-    if not os.path.lexists(path) or _is_of_demo(path):
+def _refuse_another(path: Path, is_of_demo: Callable[[Path], bool]) -> None:
+    """Refuse to replace what is not the demonstration's."""
+    if not os.path.lexists(path):
         return
+    with suppress(TactileBayesError, OSError):
+        if is_of_demo(path):
+            return
     raise ParameterError(
-        f"{path} is no record of the demonstration, which would replace it: give another folder, as in "
+        f"{path} is no {path.stem} of the demonstration, which would replace it: give another folder, as in "
         "tactile-bayes demo --out results/demo"
     )
 
 
-def _is_of_demo(path: Path) -> bool:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RecordWarning)
-            found = read_record(path)
-        if (rod_of(found), LoadCell.from_record(found)) != (ROD, LOAD_CELL):
-            return False
-    except (TactileBayesError, OSError):
+def _is_record(path: Path) -> bool:
+    """Return whether a record differs from those of the demonstration in its noise alone."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RecordWarning)
+        found = read_record(path)
+    if (rod_of(found), LoadCell.from_record(found)) != (ROD, LOAD_CELL):
         return False
     ideal = scan(CONTOUR, Rig(rod=ROD)).record
     fixed = [name for name in MEASURED if name not in CHANNELS]
     return found.sizes == ideal.sizes and all(np.array_equal(found[name], ideal[name]) for name in fixed)
-
-
-def _refuse_another_rig(path: Path) -> None:
-    """Refuse to replace a description of another rig than that of the demonstration."""
-    try:
-        if not os.path.lexists(path) or Rig.read(path).text == RIG.text:
-            return
-    except (TactileBayesError, OSError):
-        pass
-    raise ParameterError(
-        f"{path} is no rig of the demonstration, which would replace it: give another folder, as in "
-        "tactile-bayes demo --out results/demo"
-    )

@@ -20,15 +20,15 @@ from tactile_bayes.runs.names import DESIGN
 def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> Run[xr.Dataset]:
     """Choose the next record, and write the result to a folder."""
     found = design(*args, nested=nested, out=Path(out) / "nested" if nested else None, **options)
-    numbers = found.drop_vars(["drive", "is_pivot"]).data_vars
-    columns = [str(name) for name, values in numbers.items() if values.dims == ("candidate",)]
-    rows = np.stack([found[name].values for name in columns], axis=1)
-    lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
+    columns = [name for name in columns if name not in ("drive", "is_pivot")]
     if not found.is_pivot.values.all():
-        lines = [f'{line},"{drive}"' for line, drive in zip(lines, ["drive", *found.drive.values], strict=True)]
+        columns.append("drive")
+    candidates = found[columns].to_dataframe()[columns]
     with Folder(out, DESIGN) as folder:
         folder.write_netcdf("design", "design.nc", found)
-        folder.write_lines("candidates", "candidates.csv", lines)
+        with folder.file("candidates", "candidates.csv") as temporary:
+            candidates.to_csv(temporary, index=False, float_format="%.9g", na_rep="nan")
         folder.write_lines("words", "words.txt", design_messages(found))
         folder.draw("figure", "design.png", plotting.design, found)
     return Run(found, folder.files)

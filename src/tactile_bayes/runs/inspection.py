@@ -20,16 +20,14 @@ from tactile_bayes.runs.names import INSPECTION
 
 
 def write_inspection(
-    inspection: Inspection, out: str | os.PathLike[str], *, text: Sequence[str] = (), rig: Rig | None = None
+    inspection: Inspection, out: str | os.PathLike[str], *, text: Sequence[str] = (), rig: Rig
 ) -> Mapping[str, Path]:
     """Write an inspection to a folder."""
-    rig_file = "" if rig is None else _rig_file(inspection, rig)
-    if rig is not None:
-        _refuse_edited(Path(out) / "rig.toml")
-    with Folder(out, INSPECTION if rig is not None else [name for name in INSPECTION if name != "rig.toml"]) as folder:
-        if rig is not None:
-            with folder.file("rig", "rig.toml") as temporary:
-                temporary.write_text(rig_file, encoding="utf-8", newline="\n")
+    rig_file = _rig_file(inspection, rig)
+    _refuse_edited(Path(out) / "rig.toml")
+    with Folder(out, INSPECTION) as folder:
+        with folder.file("rig", "rig.toml") as temporary:
+            temporary.write_text(rig_file, encoding="utf-8", newline="\n")
         folder.write_lines("words", "inspection.txt", (*inspection.messages, *text))
         sweeps = inspection.sweeps
         named = {f"{event}_drive_angle": event for event in ("onset", "snap_off")}

@@ -144,8 +144,7 @@ def infer_contours(
     table = _table({**others, **{name: rows[name] for name in names}})
     with Folder(folder, MANY) as written:
         written.write_netcdf("table", "runs.nc", table)
-        with written.file("table as text", "runs.csv") as temporary:
-            _flat(table).to_dataframe().to_csv(temporary)
+        written.write_table("table as text", "runs.csv", _flat(table))
     return table
 
 
@@ -293,15 +292,10 @@ def _table(rows: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     numbers = np.array(
         [[row.get("quantities", {}).get(name, none) for name in quantities] for row in rows.values()], dtype=float
     ).reshape(len(rows), len(quantities), 3)
-    units: dict[str, str] = {}
-    for row in rows.values():
-        units = {**row.get("units", {}), **units}
+    units = {name: unit for row in reversed(list(rows.values())) for name, unit in row.get("units", {}).items()}
+    defaults = {"verdict": "", "converged": False, "error": "", "seconds": none[0], "band_width": none[0]}
     columns: dict[str, Any] = {
-        "verdict": ("record", [str(row.get("verdict", "")) for row in rows.values()]),
-        "converged": ("record", [bool(row.get("converged", False)) for row in rows.values()]),
-        "error": ("record", [str(row.get("error", "")) for row in rows.values()]),
-        "seconds": ("record", [float(row["seconds"]) for row in rows.values()]),
-        "band_width": ("record", [float(row.get("band_width", float("nan"))) for row in rows.values()]),
+        **{name: ("record", [row.get(name, value) for row in rows.values()]) for name, value in defaults.items()},
         **{part: (("record", "quantity"), numbers[..., i]) for i, part in enumerate(("median", "lower", "upper"))},
         "unit": ("quantity", [units.get(name, "1") for name in quantities]),
     }

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
+PICTURES = ("predictive", "rods", "contour", "gap", "trace", "pairs")
 INFERENCE = (
-    "summary.txt",
-    "posterior.nc",
-    "contacts.csv",
-    "band.csv",
-    "summary.csv",
-    "predictive.png",
-    "rods.png",
-    "contour.png",
-    "gap.png",
-    "trace.png",
-    "pairs.png",
+    *("summary.txt", "posterior.nc", "contacts.csv", "band.csv", "summary.csv"),
+    *(f"{name}.png" for name in PICTURES),
 )
 TRUST = ("trust.nc", "trust.txt", "assumptions.png")
 OVERLAY = "overlay.png"
@@ -30,15 +22,8 @@ CALIBRATION = ("verdict.txt", "calibration.nc", "ranks.png", "coverage.png")
 DESIGN = ("words.txt", "design.nc", "candidates.csv", "design.png")
 STUDY = ("study.nc", "study.png")
 SENSITIVITY = (
-    "words.txt",
-    "sensitivity.nc",
-    "amplification.png",
-    "information.png",
-    "noise_shares.png",
-    "required_noise.png",
-    "rods.nc",
-    "required_rod.png",
-    *(f"study/{name}" for name in STUDY),
+    *("words.txt", "sensitivity.nc", "amplification.png", "information.png", "noise_shares.png", "required_noise.png"),
+    *("rods.nc", "required_rod.png", *(f"study/{name}" for name in STUDY)),
 )
 CHECKPOINT = ("checkpoint.npz",)
 DATASET = ("manifest.json", "README.md", "shard-*.nc")

@@ -112,7 +112,9 @@ class Watch:
         if until_width is not None:
             check_positive("until_width", until_width)
             if between is None:
-                raise ParameterError("until_width is for a stretch of the contour: give its ends in x with between")
+                raise ParameterError(
+                    "until_width is for a stretch of the contour: give its ends in x, like --between -0.02,0.02"
+                )
         if until_probability is not None:
             check_probability("until_probability", until_probability)
             if len(families) < 2:
