@@ -1,7 +1,6 @@
 """The command line, inside this process and as a stranger would start it."""
 
 import json
-import math
 import os
 import re
 import subprocess
@@ -16,7 +15,6 @@ from helpers.interrupts import interrupted_while_sampling
 from helpers.report_pages import FEW
 from tactile_bayes import __version__, read_record
 from tactile_bayes.cli import app
-from tactile_bayes.cli.progress import remaining_seconds
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import Progress
@@ -277,26 +275,6 @@ def test_shells_can_complete_options():
     command = str(Path(sys.executable).with_name("tactile-bayes"))
     done = subprocess.run([command], env={**os.environ, **asking}, capture_output=True, text=True, timeout=100)
     assert done.stdout.split() == ["--family"], done.stderr
-
-
-# --- Progress -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("made", "left"),
-    [
-        ({"ess": 250.0}, 30.0),  # a quarter in 10 s
-        ({"ess": 20.0}, 90.0),  # but steps run out
-        ({"ess": 1500.0, "r_hat": 1.2}, 2.0),
-        ({"ess": math.nan}, None),
-        ({"steps": 0, "ess": 0.0}, None),
-    ],
-)
-def test_time_that_is_left_is_that_of_draws_as_they_came(made, left):
-    progress = Progress(**{"steps": 100, "max_steps": 1000, "r_hat": 1.05, "seconds": 10.0, **made})
-    assert remaining_seconds(progress) == pytest.approx(left)
-    if left is not None:
-        assert remaining_seconds(progress, max_seconds=10.5) == pytest.approx(0.5)
 
 
 # --- Interrupts -----------------------------------------------------------------------------------------------------

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING, Annotated
 
 from tactile_bayes.cli.interrupts import resumable
@@ -14,9 +14,6 @@ from tactile_bayes.errors import ParameterError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
-
-    from rich.progress import ProgressColumn, Task
-    from rich.text import Text
 
     from tactile_bayes.inference.ensembles import Progress
     from tactile_bayes.tasks import TaskProgress, Workers
@@ -71,7 +68,7 @@ def resumable_bar(
         return f"{last.done:,} of {counted(last.wanted, noun)} are in {where}"
 
     at_first = "beginning" if total is None else f"{counted(total, noun)} to be made"
-    with resumable(have, then) as raise_lost, step_bar(quiet, noun, at_first, has_rate=True) as show:
+    with resumable(have, then) as raise_lost, step_bar(quiet, noun, at_first) as show:
 
         def note(progress: TaskProgress) -> None:
             nonlocal last
@@ -83,44 +80,30 @@ def resumable_bar(
 
 
 @contextmanager
-def step_bar(
-    quiet: bool, noun: str = "step", at_first: str = "beginning", *, has_rate: bool = False
-) -> Iterator[Callable[[int, int], object]]:
+def step_bar(quiet: bool, noun: str = "step", at_first: str = "beginning") -> Iterator[Callable[[int, int], object]]:
     """Show a bar, and yield a function that takes the number done and the total; a spinner moves meanwhile."""
-    from rich.progress import BarColumn, ProgressColumn, TextColumn, TimeRemainingColumn
-    from rich.text import Text
-
-    class Rate(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            if not task.speed:
-                return Text("")
-            return Text(f"{task.speed:,.0f} {noun}s/s" if task.speed > 2.0 else f"{1.0 / task.speed:.2g} s a {noun}")
-
-    rate = (Rate(),) if has_rate else ()
-    columns = (BarColumn(), TextColumn("{task.description}"), *rate, TimeRemainingColumn())
-    with moving_bar(quiet, at_first, *columns) as move:
+    with moving_bar(quiet, at_first) as move:
 
         def show(done: int, count: int) -> None:
             if move is not None:
-                description = f"{done:,} of {counted(count, noun)}"
-                move(total=count, completed=done, description=description, left="left")
+                move(total=count, completed=done, description=f"{done:,} of {counted(count, noun)}")
 
         yield show
 
 
 @contextmanager
-def moving_bar(quiet: bool, at_first: str, *columns: ProgressColumn) -> Iterator[Callable[..., object] | None]:
-    """Show a bar with a spinner, columns and remaining time; yield its update function, or None without a terminal."""
+def moving_bar(quiet: bool, at_first: str) -> Iterator[Callable[..., object] | None]:
+    """Show a bar with a spinner and the remaining time; yield its update function, or None without a terminal."""
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
         yield None
         return
-    left = TextColumn("{task.fields[left]}")
-    with Progress(SpinnerColumn("line"), *columns, left, console=console, transient=True) as bar:
-        yield partial(bar.update, bar.add_task(at_first, total=None, left=""))
+    columns = (SpinnerColumn("line"), BarColumn(12), TextColumn("{task.description}"), TimeRemainingColumn(), "left")
+    with Progress(*columns, console=console, transient=True) as bar:
+        yield partial(bar.update, bar.add_task(at_first, total=None))
 
 
 def counted(count: int, noun: str) -> str:
@@ -130,7 +113,7 @@ def counted(count: int, noun: str) -> str:
 
 @dataclass(frozen=True)
 class SamplingBar:
-    """A bar that fills with the effective sample size, and then names what follows."""
+    """A bar that fills until sampling ends: by effective draws, steps or seconds; and then names what follows."""
 
     move: Callable[..., object]
     max_seconds: float | None
@@ -139,49 +122,22 @@ class SamplingBar:
         """Show progress; `what` names one of several runs."""
         words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
         if progress.ess >= _GOAL and progress.r_hat <= _MAX_R_HAT:
-            words, left = "sampled", ""
-        else:
-            seconds = remaining_seconds(progress, self.max_seconds)
-            left = "" if seconds is None else f"about {_in_words(seconds)} left"
-        done = min(progress.ess, _GOAL) if progress.ess == progress.ess else 0.0
-        self.move(total=_GOAL, completed=done, description=f"{what}, {words}" if what else words, left=left)
+            words = "sampled"
+        shares = (
+            progress.ess / _GOAL,
+            progress.steps / progress.max_steps,
+            progress.seconds / (self.max_seconds or inf),
+        )
+        done = max(share for share in shares if share == share)  # NaN without effective draws
+        self.move(total=1.0, completed=min(done, 1.0), description=f"{what}, {words}" if what else words)
 
     def follow(self, what: str) -> None:
         """Show what is done now."""
-        self.move(total=None, description=what, left="")
+        self.move(total=None, description=what)
 
 
 @contextmanager
 def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[SamplingBar | None]:
-    """Show a bar that fills with the effective sample size; no bar if quiet or without a terminal."""
-    from rich.progress import BarColumn, TextColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(12))
-    with moving_bar(quiet, "looking for a start, then sampling", *columns) as move:
+    """Show a bar of sampling; none if quiet or without a terminal."""
+    with moving_bar(quiet, "looking for a start, then sampling") as move:
         yield None if move is None else SamplingBar(move, max_seconds)
-
-
-def remaining_seconds(progress: Progress, max_seconds: float | None = None) -> float | None:
-    """Estimate the remaining time of sampling [s] from the rate of effective draws so far; None if it is unknown.
-
-    It is at most the time until the steps, or the time limit, are used up.
-    """
-    if not (progress.steps and progress.seconds > 0.0):
-        return None
-    rate = progress.seconds / progress.steps
-    most = rate * (progress.max_steps - progress.steps)
-    if max_seconds is not None:
-        most = min(most, max_seconds - progress.seconds)
-    if progress.ess >= _GOAL:  # R̂ has still to settle, which may take a fifth more
-        return max(0.0, min(0.2 * progress.seconds, most))
-    if not (math.isfinite(progress.ess) and progress.ess > 0.0):
-        return None
-    return max(0.0, min(progress.seconds * (_GOAL / progress.ess - 1.0), most))
-
-
-def _in_words(seconds: float) -> str:
-    """Return text like "40 s", "5 min" and "2 h 10 min"."""
-    if seconds < 90.0:
-        return f"{max(1, round(seconds))} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"

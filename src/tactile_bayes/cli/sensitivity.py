@@ -92,7 +92,7 @@ def sensitivity(
     }
     if not replicates:
         steps = steps_of(material)
-        with step_bar(output.is_silent, has_rate=True) as show:
+        with step_bar(output.is_silent) as show:
             run = sensitivity_into(out, progress=lambda done: show(done, steps), **analysis)
         return _answer(run)
     over = {"distance": distances, "noise_factor": noise_factor or [0.1, 0.3, 1.0, 3.0]}

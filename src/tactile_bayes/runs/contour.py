@@ -126,10 +126,8 @@ def analyse(
 ) -> ContourRun:
     """Write contact points, contour posterior, band and, if asked for, figures of a record to a folder.
 
-    The posterior is written as soon as it is sampled, and again with its predictions. A part that fails afterwards is
-    left out and named, and all others are made. The posterior removes what belonged to a former one; the other files
-    come together at the end, so that a folder without summary.txt is not complete. `follow` is called with the name of
-    each part that follows sampling, as it begins.
+    The posterior is written as soon as it is sampled, in place of a former run, and all other files at the end.
+    A part that fails is left out and named. `follow` is called with the name of each part after sampling, as it begins.
     """
     check_probability("probability", probability)
     options["family"], rig = family_of(options.get("family", "parabola")), rig_of(rig)

@@ -35,9 +35,7 @@ class Run(Generic[Result]):
 class Folder:
     """A folder of results, created if missing, in which the files of one run replace those of the former one together.
 
-    They are moved into it at the end of a `with` block (`replace_together`); if it raises, the folder stays as it was.
-    Of all `names` that such a run can write, those it does not write are removed; without the first one it is not
-    complete.
+    They are moved into it at the end of a `with` block, in place of all `names` that such a run can write.
     """
 
     def __init__(self, out: str | os.PathLike[str], names: Sequence[str]) -> None:

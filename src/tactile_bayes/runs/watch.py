@@ -40,22 +40,16 @@ class WatchUpdate(NamedTuple):
     samples: int  # number of samples that are taken into account so far
     new: int  # number of those that came with this update
     seconds: float  # time that the update took, with its files [s]
-    # True if all samples were taken again since they do not continue those before, and not since others of them are
-    # left out.
-    restarted: bool
+    restarted: bool  # whether all samples were taken again since they do not continue those before
     every: int  # stride of the samples that are taken into account; 1 if all are
     posterior: xr.DataTree
     summary: xr.Dataset  # parameters with intervals
-    # Band between the given ends, or over the arcs that sweeps touch if they continue; None if they touch nothing.
-    band: xr.Dataset | None
+    band: xr.Dataset | None  # None if nothing is touched
     width: float  # largest width of the band [length]; NaN without one
     probabilities: Mapping[str, float]  # probability of each family, if there are several
-    # Families whose evidence is too small, since their particles had lost the posterior for a while.
-    underrated: Sequence[str]
+    underrated: Sequence[str]  # families of too small an evidence, whose particles had lost the posterior
     e_value: float  # that of `Stream.update`; of several families the least; NaN if there is none
-    # Reason why measuring may stop; empty if it may not, or the posterior has not converged. Probabilities are none if
-    # an evidence is too small.
-    enough: str
+    enough: str  # reason why measuring may stop; empty if it may not, or the posterior has not converged
 
 
 @contextmanager
@@ -69,22 +63,8 @@ def open_watch(out: str | os.PathLike[str], **options: Any) -> Iterator[Watch]:
 class Watch:
     """The stream behind a record that grows, with its folder, which has stream.nc and posterior.nc after each update.
 
-    Parameters
-    ----------
-    between : pair of float, optional
-        Ends of the band in x, in the record's unit of length; by default those of the arcs that
-        its sweeps touch if they continue.
-    until_width, until_probability : float, optional
-        Width below which the band has to be everywhere between these ends for measuring to stop [length], and
-        probability of a family above which it may.
-    most_samples : int
-        Largest number of samples that are taken into account. Of a longer record every second sample is, every fourth,
-        and so on; when this begins, all that are left are taken again. Records of a load cell that drifts from sample
-        to sample are taken whole.
-    families : sequence of str or Family
-        Of several, the posterior is that of the most probable one, and the band is averaged.
-    **options
-        Arguments of `Stream`, without family and rig.
+    `between` are the ends of the band in x, by default those of what sweeps touch if they continue. Of more than
+    `most_samples` every second one is taken, every fourth, and so on. `options` are arguments of `Stream`.
     """
 
     def __init__(

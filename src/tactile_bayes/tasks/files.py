@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from tactile_bayes.errors import ParameterError
 
@@ -25,9 +26,7 @@ _DAY = 86_400.0
 def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path to write to, and move it to `path` when the block has succeeded, else remove it.
 
-    It has the same name, in a hidden, locked folder beside `path`. Those that killed processes have left are removed
-    first if their lock shows that nobody writes to them (not on Windows, nor on a file system without locks), and if
-    they are from this machine or a day old, since locks may not reach other machines.
+    It has the same name, in a hidden, locked folder beside `path`.
     """
     target = Path(path).resolve()
     with _beside(target.parent, target) as folder:
@@ -35,17 +34,15 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield temporary
         _flush(temporary)
         os.replace(temporary, target)
-        _flush_folder(target.parent)
+        _flush(target.parent)
 
 
 @contextmanager
 def replace_together(folder: Path, names: Sequence[str]) -> Iterator[Path]:
-    """Yield a temporary folder for files that replace those of these names in `folder`, when the block has succeeded.
+    """Yield a temporary folder for files that replace all of these names in `folder`, when the block has succeeded.
 
-    Names of which the block writes no file are removed. If it raises, or a file cannot be replaced, `folder` stays as
-    it was. There are never old files beside new ones: the old ones go first, the first name is the first to go and the
-    last to come, and a single new file that is not the first replaces the old one at once. A process that is killed
-    leaves the old files, the new ones, or none of the first name.
+    If it raises, or a file cannot be replaced, `folder` stays as it was. Old files are never beside new ones: the first
+    name is the first to go and the last to come. A single new file that is not the first replaces the old one at once.
     """
     with _beside(folder, folder) as temporary:
         yield temporary
@@ -53,7 +50,7 @@ def replace_together(folder: Path, names: Sequence[str]) -> Iterator[Path]:
         for name in new:
             _flush(temporary / name)
         _exchange(folder, temporary, names, new)
-        _flush_folder(folder)
+        _flush(folder)
 
 
 def _exchange(folder: Path, temporary: Path, names: Sequence[str], new: Sequence[str]) -> None:
@@ -106,8 +103,14 @@ def _beside(parent: Path, target: Path) -> Iterator[Path]:
     if not parent.is_dir():  # else the refusal would name the temporary file
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(parent))
     _remove_leftovers(parent)
-    with errors_of(target), _hidden_folder(parent) as folder:
-        yield folder
+    with errors_of(target):
+        folder, handle = _locked_folder(parent)
+        try:
+            yield folder
+        finally:
+            _remove(folder)
+            if handle is not None:
+                os.close(handle)
 
 
 @contextmanager
@@ -121,23 +124,9 @@ def errors_of(target: Path) -> Iterator[None]:
         raise type(error)(error.errno, error.strerror, str(target)) from error
 
 
-def _in_hidden_folder(name: object) -> bool:
+def _in_hidden_folder(name: Any) -> bool:
     """Return whether an error names a file in a hidden folder, or such a folder."""
-    return isinstance(name, str | bytes | os.PathLike) and any(
-        _TEMPORARY.fullmatch(part) for part in Path(os.fsdecode(name)).parts
-    )
-
-
-@contextmanager
-def _hidden_folder(parent: Path) -> Iterator[Path]:
-    """Create a locked folder, and remove it at the end."""
-    folder, handle = _locked_folder(parent)
-    try:
-        yield folder
-    finally:
-        _remove(folder)
-        if handle is not None:
-            os.close(handle)
+    return any(map(_TEMPORARY.fullmatch, Path(os.fsdecode(name)).parts))
 
 
 def _locked_folder(parent: Path) -> tuple[Path, int | None]:
@@ -165,23 +154,19 @@ def _remove(folder: Path) -> None:
 
 
 def _flush(path: Path) -> None:
-    """Flush a file to the disk."""
-    with open(path, "r+b") as written:
-        os.fsync(written.fileno())
-
-
-def _flush_folder(folder: Path) -> None:
-    """Flush the names in a folder to the disk, except on Windows, which cannot, and whose renames are journalled."""
-    if os.name != "nt":
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+    """Flush a file, or the names in a folder, to the disk; not a folder of Windows, whose renames are journalled."""
+    is_folder = path.is_dir()
+    if is_folder and os.name == "nt":
+        return
+    handle = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _remove_leftovers(parent: Path) -> None:
-    """Remove hidden folders of killed processes, where they can be identified and removed."""
+    """Remove hidden folders of killed processes: nobody holds their lock, which may not reach another machine."""
     with suppress(OSError):
         for name in os.listdir(parent):
             if match := _TEMPORARY.fullmatch(name):

@@ -23,9 +23,8 @@ def cores() -> int:
 def in_parts(function: Callable[[slice], None], count: int, fewest: int) -> None:
     """Call a function on parts of `count` items, side by side if there are cores for them and parts are large enough.
 
-    The function releases the global interpreter lock, and writes the results of its items. These must not depend on the
-    parts. There are as many threads as cores, or as the environment variable NUMBA_NUM_THREADS says, and one within
-    `one_thread`.
+    The function releases the global interpreter lock, and writes the results of its items. There are as many threads as
+    cores, or as the environment variable NUMBA_NUM_THREADS says, and one within `one_thread`.
     """
     threads = 1 if getattr(_here, "is_one", False) else min(_threads(), count // fewest)
     if threads < 2:

@@ -86,9 +86,8 @@ def run_tasks(
 ) -> Generator[tuple[Task, Result], None, None]:
     """Call a function on every task, and yield results in the order in which they are ready.
 
-    A process that dies (killed, out of memory) is replaced, and its task is repeated. The result of a task must not
-    depend on where or when it is computed. Each task runs on one thread. Processes end with the
-    iterator, and with this process, however it ends; only this process receives Ctrl-C.
+    A process that dies (killed, out of memory) is replaced, and its task is repeated. Each task runs on one thread.
+    Processes end with the iterator, and with this process, however it ends; only this process receives Ctrl-C.
     """
     where = workers_of(workers).where
     if isinstance(where, str):
