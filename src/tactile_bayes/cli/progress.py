@@ -123,11 +123,8 @@ class SamplingBar:
         words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
         if progress.ess >= _GOAL and progress.r_hat <= _MAX_R_HAT:
             words = "sampled"
-        shares = (
-            progress.ess / _GOAL,
-            progress.steps / progress.max_steps,
-            progress.seconds / (self.max_seconds or inf),
-        )
+        time = progress.seconds / (self.max_seconds or inf)
+        shares = (progress.ess / _GOAL, progress.steps / progress.max_steps, time)
         done = max(share for share in shares if share == share)  # NaN without effective draws
         self.move(total=1.0, completed=min(done, 1.0), description=f"{what}, {words}" if what else words)
 

@@ -10,9 +10,9 @@ import typer
 from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.contour_options import GaugeOptions
 from tactile_bayes.cli.progress import sampling_bar
 from tactile_bayes.cli.rig_options import RigOptions
+from tactile_bayes.cli.scan_options import GaugeOptions
 from tactile_bayes.runs.names import RIG
 
 if TYPE_CHECKING:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output, Writes
-from tactile_bayes.cli.contour_options import ContourOptions
-from tactile_bayes.cli.drive_options import Directions, DriveOptions, Pivots
 from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import RigFile
+from tactile_bayes.cli.scan_options import ContourOptions, Directions, DriveOptions, Pivots
 from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
