@@ -10,14 +10,13 @@ from pathlib import Path
 import pytest
 import typer
 
-from helpers.commands import call
+from helpers.commands import answered, call, succeed
 from helpers.interrupts import interrupted_while_sampling
 from helpers.report_pages import FEW
 from tactile_bayes import __version__, read_record
 from tactile_bayes.cli import app
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig import NOTHING, Rig
@@ -47,25 +46,19 @@ def posterior(record):
 def at_once(monkeypatch, posterior):
     """Runs without figures to which the posterior is given."""
 
-    def found(measured, *, progress=None, **options):
-        if progress is not None:
-            progress(Progress(steps=50, max_steps=100, r_hat=1.02, ess=300.0, seconds=1.0))
-        return posterior.copy(deep=True)
-
-    monkeypatch.setattr(contour_run, "infer_contour", found)
+    monkeypatch.setattr(contour_run, "infer_contour", lambda measured, **options: posterior.copy(deep=True))
     monkeypatch.setattr(contour_run, "_draw", lambda *arguments, **options: {})
 
 
-# --- Help and imports -----------------------------------------------------------------------------------------------
-
-
-def test_help_lists_the_commands():
+def test_help_lists_the_commands_and_states_the_exit_codes():
     result = call("--help")
     assert result.exit_code == 0
     commands = result.stdout.split("Commands:")[1].split("\n\n")[0]
     found = [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "]
     assert found[: len(COMMANDS)] == COMMANDS
     assert {"demo", "dataset"} <= set(found)
+    words = " ".join(result.stdout.split())
+    assert re.search(r" 0 .*done.* 1 .*error.* 2 .*refused.* 130 .*Ctrl-C.* 143 .*terminated", words)
 
 
 def commands_of(group, prefix=""):
@@ -87,11 +80,6 @@ def test_every_command_has_an_example_at_most_15_options_can_be_quiet_and_answer
     assert [each for each in words if each not in shown] == []
     options = [each for each in ALL[name].params if each.param_type_name == "option" and each.name != "help"]
     assert len(options) <= 15
-
-
-def test_help_states_the_exit_codes():
-    words = " ".join(call("--help").stdout.split())
-    assert re.search(r" 0 .*done.* 1 .*error.* 2 .*refused.* 130 .*Ctrl-C.* 143 .*terminated", words)
 
 
 def test_version():
@@ -116,15 +104,9 @@ def test_what_is_heavy_is_loaded_when_used(code):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-# --- Results --------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.usefixtures("quick")
 def test_an_answer_in_json_is_one_object_and_says_whether_it_is_to_be_trusted(record, tmp_path):
-    result = call("infer", record, "--out", tmp_path / "run", "--json")
-    assert result.exit_code == 0, result.output
-    assert result.stderr == ""
-    answer = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    answer = answered("infer", record, "--out", tmp_path / "run")
     assert answer["converged"] is False
     assert answer["message"].startswith("not converged")
     assert any(sentence.startswith("NOT CONVERGED") for sentence in answer["words"])
@@ -137,13 +119,12 @@ def test_an_answer_in_json_is_one_object_and_says_whether_it_is_to_be_trusted(re
 
 @pytest.mark.usefixtures("at_once")
 def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
-    result = call("demo", "--out", tmp_path / "demo")
-    assert result.exit_code == 0, result.output
+    result = succeed("demo", "--out", tmp_path / "demo")
     assert "\ntactile-bayes infer RECORD --rig rig.toml --out RUN\n" in result.stdout
     assert "truth" in result.stdout
     assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
     assert Rig.read(tmp_path / "demo" / "rig.toml").entries == dict(NOTHING)
-    answer = json.loads(call("demo", "--out", tmp_path / "demo", "--json").stdout)
+    answer = answered("demo", "--out", tmp_path / "demo")
     assert {row["quantity"]: row["truth"] for row in answer["quantities"]}["a"] == 2.5
     assert answer["files"]["record"] == str(tmp_path / "demo" / "record.csv")
 
@@ -154,8 +135,7 @@ def test_what_is_wrong_with_the_record_is_the_first_line(posterior, record, tmp_
     large["observed_data"]["force_x"] *= 1e3
     large["observed_data"]["force_y"] *= 1e3
     monkeypatch.setattr(contour_run, "infer_contour", lambda measured, **options: large)
-    result = call("infer", record, "--out", tmp_path / "run", "--quiet")
-    assert result.exit_code == 0, result.output
+    result = succeed("infer", record, "--out", tmp_path / "run", "--quiet")
     assert result.stdout.startswith("Forces reach ")
     summary = (tmp_path / "run" / "summary.txt").read_text(encoding="utf-8")
     assert result.stdout.split("\n\n")[0] == summary.split("\n\n")[0]
@@ -169,8 +149,7 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
         raise RuntimeError("it broke")
 
     monkeypatch.setattr(contour_run, "contour_band", broken)
-    result = call("infer", record, "--out", tmp_path / "run", "--quiet")
-    assert result.exit_code == 0, result.output
+    result = succeed("infer", record, "--out", tmp_path / "run", "--quiet")
     assert re.search("(?m)^Left out: band.*: it broke$", result.stdout.split("\n\n")[0])
     assert re.fullmatch("tactile-bayes: .*band.*--debug.*\n", result.stderr)
     assert (tmp_path / "run" / "posterior.nc").exists()
@@ -185,16 +164,6 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
     assert "in broken" in traced.stderr
 
 
-@pytest.mark.usefixtures("at_once")
-def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(record, tmp_path, monkeypatch):
-    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
-    result = call("infer", record, "--out", tmp_path)
-    assert result.exit_code == 0, result.output
-    assert "effective draws 300" in result.stderr
-    assert "effective draws" not in result.stdout
-    assert " left" in result.stderr
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_path):
@@ -202,13 +171,9 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
     rows = [f"0,forward,{0.5 + 0.05 * i},{0.1 * (3 < i < 30)},,,0,0" for i in range(40)]
     names = "sweep,direction,drive_angle,holding_moment,force_x,force_y,base_x,base_y"
     path.write_text("\n".join([names, *rows]) + "\n", encoding="utf-8")
-    result = call("infer", path, "--out", tmp_path / "run", "-q")
-    assert result.exit_code == 0, result.output
+    result = succeed("infer", path, "--out", tmp_path / "run", "-q")
     assert re.match(r".*dimensionless.*--length.*--flexural-rigidity.*\[rod\]", result.stderr)
     assert "No contact points" in result.stdout
-
-
-# --- Options, errors, warnings --------------------------------------------------------------------------------------
 
 
 @pytest.mark.filterwarnings("ignore:.*no unit is stated")
@@ -263,8 +228,9 @@ def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_p
 @pytest.mark.filterwarnings("always::tactile_bayes.errors.StrainWarning")
 def test_a_warning_is_a_line(rig_file, tmp_path):
     rod = rig_file("[rod]\nlength = 0.2\nflexural_rigidity = 1e-2\ndiameter = 0.02\n")
-    result = call("scan", "--rig", rod, "--drive-step", 10, "--direction", "forward", "--out", tmp_path / "record.csv")
-    assert result.exit_code == 0, result.output
+    result = succeed(
+        "scan", "--rig", rod, "--drive-step", 10, "--direction", "forward", "--out", tmp_path / "record.csv"
+    )
     (line,) = result.stderr.splitlines()
     assert re.match(r"tactile-bayes: warning: .*forward.*\(0, 0\).*strained", line)
 
@@ -276,8 +242,6 @@ def test_shells_can_complete_options():
     done = subprocess.run([command], env={**os.environ, **asking}, capture_output=True, text=True, timeout=100)
     assert done.stdout.split() == ["--family"], done.stderr
 
-
-# --- Interrupts -----------------------------------------------------------------------------------------------------
 
 NO_FIGURES = """
 from tactile_bayes.runs import contour as run
@@ -295,13 +259,8 @@ def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
     assert answer.startswith("tactile-bayes: stopping; ")
     assert re.fullmatch("tactile-bayes: interrupted, .*--checkpoint FOLDER.*\n", end)
     assert "NOT CONVERGED, interrupted" in out.split("\n\n")[0]
-    assert {path.name for path in (tmp_path / "run").iterdir()} == {
-        "posterior.nc",
-        "contacts.csv",
-        "band.csv",
-        "summary.txt",
-        "summary.csv",
-    }
+    names = {"posterior.nc", "contacts.csv", "band.csv", "summary.txt", "summary.csv"}
+    assert {path.name for path in (tmp_path / "run").iterdir()} == names
 
 
 def test_control_c_before_there_is_a_draw_says_so(record, tmp_path, monkeypatch):

@@ -1,11 +1,9 @@
 """The command `calibrate-rig`, and `infer --rig`, which takes its result over."""
 
-import json
-
 import numpy as np
 import pytest
 
-from helpers.commands import assert_refused, call
+from helpers.commands import answered, assert_refused, call, succeed
 from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.result import read_result
@@ -58,13 +56,9 @@ def test_words_come_first_then_the_table_then_the_files(calibrated):
 @pytest.mark.slow
 def test_several_records_add_up(records, calibrated, tmp_path):
     """At once, or one after the other with --rig: the same numbers."""
-    asked = ("calibrate-rig", records / "pin.nc", records / "again.nc", *PIN, "--rig", records / "rig.toml", "--json")
-    at_once = call(*asked, "--out", tmp_path / "both")
-    added = call(
-        "calibrate-rig", asked[2], *PIN, "-q", "--rig", calibrated[1] / "rig.toml", "--out", tmp_path / "added"
-    )
-    assert at_once.exit_code == added.exit_code == 0, at_once.output + added.output
-    said = json.loads(at_once.stdout)
+    asked = ("calibrate-rig", records / "pin.nc", records / "again.nc", *PIN, "--rig", records / "rig.toml")
+    said = answered(*asked, "--out", tmp_path / "both")
+    succeed("calibrate-rig", asked[2], *PIN, "-q", "--rig", calibrated[1] / "rig.toml", "--out", tmp_path / "added")
     assert [word[:10] for word in said["words"][:2]] == ["Record 1: ", "Record 2: "]
     assert said["converged"]
     assert said["gauge"] == repr(Circle(r=0.2, q=0.5))
@@ -83,8 +77,7 @@ def test_several_records_add_up(records, calibrated, tmp_path):
 def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
     folder = calibrated[1]
     options = ("--rig", folder / "rig.toml", "--out", tmp_path, "--quiet")
-    result = call("infer", records / "object.nc", *options)
-    assert result.exit_code == 0, result.output
+    succeed("infer", records / "object.nc", *options)
     run = read_result(tmp_path / "posterior.nc")
     assert list(run["posterior"].data_vars) == ["a", "q", "x_c", "rigidity_scale", "noise_scale"]
     assert run.attrs["rig_data_sha256"] == read_result(folder / "rig.nc").attrs["data_sha256"]
@@ -98,8 +91,9 @@ def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
 @pytest.mark.slow
 def test_a_wrong_gauge_is_the_first_thing_said(records, tmp_path):
     wrong = ("--family", "circle", "--parameter", "r=0.3", "--parameter", "q=0.5")
-    result = call("calibrate-rig", records / "pin.nc", *wrong, "--rig", records / "rig.toml", "--out", tmp_path, "-q")
-    assert result.exit_code == 0, result.output
+    result = succeed(
+        "calibrate-rig", records / "pin.nc", *wrong, "--rig", records / "rig.toml", "--out", tmp_path, "-q"
+    )
     first = result.stdout.splitlines()[0]
     assert [part for part in ("The gauge", "not describe", "use this rig", "size of the") if part not in first] == []
 

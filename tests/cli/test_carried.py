@@ -1,12 +1,10 @@
 """Commands on a base that is carried: a translation, and a record that is turned here and carried there."""
 
-import json
-
 import numpy as np
 import pytest
 
 import tactile_bayes as tb
-from helpers.commands import call
+from helpers.commands import answered, call, succeed
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import read_result
@@ -30,8 +28,7 @@ def run_of(folder, rig, *options):
         ("measure", ideal, "--force-noise", 0.05, "--moment-noise", 0.02, "--out", measured),
         ("infer", measured, "--family", "circle", "--rig", rig, "--out", run),
     ):
-        result = call(*arguments)
-        assert result.exit_code == 0, result.output
+        succeed(*arguments)
     return measured, run
 
 
@@ -57,7 +54,7 @@ def test_a_scan_prints_travels_and_how_contact_ends(tmp_path):
     short = call("scan", *CIRCLE, "--carry", "0.8,0,180,68.75,1.1", "--drive-step", 0.05, "--out", out)
     assert "still in contact" in short.stdout
     assert tb.read_record(out).sizes["sample"] == 23
-    (sweep,) = json.loads(call("scan", *CARRY, "--out", out, "--json").stdout)["sweeps"]
+    (sweep,) = answered("scan", *CARRY, "--out", out)["sweeps"]
     assert sweep["carried"]
     assert sweep["snap_off"]["travel"] == pytest.approx(expected.events["forward"].snap_off.travel)
 
@@ -78,7 +75,7 @@ def test_an_inspection_and_contacts_of_a_carried_rod(carried, tmp_path):
     assert "carried 1.6 L" in inspected.stdout
     assert "nan" not in inspected.stdout.lower()
     assert "onset_travel_before" in (tmp_path / "inspection" / "sweeps.csv").read_text()
-    (sweep,) = json.loads(call("inspect", measured, "--out", tmp_path / "again", "--json").stdout)["sweeps"]
+    (sweep,) = answered("inspect", measured, "--out", tmp_path / "again")["sweeps"]
     assert sweep["snap_off_travel"][0] <= 1.4811 <= sweep["snap_off_travel"][1]
     assert call("reconstruct", measured, "--out", tmp_path / "contacts").exit_code == 0
 

@@ -42,9 +42,6 @@ def rows(output):
     return {line.split()[0]: line.split()[1:] for line in table if line.split()[0] in NAMES}
 
 
-# --- Results --------------------------------------------------------------------------------------------------------
-
-
 def test_the_verdict_comes_first_then_the_table_then_the_files(compared):
     result, folder = compared
     assert result.exit_code == 0, result.output
@@ -104,14 +101,3 @@ def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
     result = call("compare", record, "--out", tmp_path)
     assert "circle, step 50: R̂ 1.020, effective draws 300" in result.stderr
     assert "effective draws" not in result.stdout
-
-
-def test_control_c_ends_all_of_it(instead, record, tmp_path):
-    def interrupted(progress):
-        raise KeyboardInterrupt("interrupted over shape-free")
-
-    instead(made_up([0.4, 0.6]), before=interrupted)
-    result = call("compare", record, "--out", tmp_path)
-    assert (result.exit_code, result.stdout) == (130, "")
-    assert result.stderr == "tactile-bayes: interrupted over shape-free\n"
-    assert list(tmp_path.iterdir()) == []

@@ -41,6 +41,7 @@ moment_noise = 0.02
 
 
 call = partial(commands.call, "dataset")
+succeed = partial(commands.succeed, "dataset")
 
 
 @pytest.fixture
@@ -55,12 +56,8 @@ def small(tmp_path_factory):
     """A data set that the command has made, and what it said."""
     folder = tmp_path_factory.mktemp("small")
     (folder / "small.toml").write_text(SMALL, encoding="utf-8")
-    result = call("generate", folder / "small.toml", "--out", folder / "set", "--workers", 1)
-    assert result.exit_code == 0, result.output
+    result = succeed("generate", folder / "small.toml", "--out", folder / "set", "--workers", 1)
     return folder / "set", result
-
-
-# --- The example ----------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -124,12 +121,8 @@ def test_the_example_names_every_key_family_and_entry(example):
 def test_the_example_is_made_and_measured(example, tmp_path):
     path = tmp_path / "set.toml"
     path.write_text(example.replace("records = 1200", "records = 24"), encoding="utf-8")
-    result = call("generate", path, "--out", tmp_path / "set", "--workers", 1)
-    assert result.exit_code == 0, result.output
+    succeed("generate", path, "--out", tmp_path / "set", "--workers", 1)
     assert np.unique(tb.datasets.open(tmp_path / "set").truth_family).size > 3
-
-
-# --- Generate -------------------------------------------------------------------------------------------------------
 
 
 def test_what_was_made_is_said_in_three_lines_and_not_made_again(small):
@@ -148,8 +141,7 @@ def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification
     monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
     monkeypatch.setenv("COLUMNS", "120")
     arguments = ("generate", specification, "--workers", 1, "--out")
-    result = call(*arguments, tmp_path / "1")
-    assert result.exit_code == 0, result.output
+    result = succeed(*arguments, tmp_path / "1")
     assert "6 of 6 records" in result.stderr
     assert "left" in result.stderr
     assert "left" not in result.stdout
@@ -231,17 +223,13 @@ def test_what_was_drawn_again_strained_or_without_contact_is_counted(specificati
     rod = "\n[rod]\nlength = 1.0\nflexural_rigidity = 1.0\ndiameter = 0.2\n"
     text = SMALL.replace("samples = 20", "samples = 20\nfrom_degrees = 170\nto_degrees = 175") + rod
     specification.write_text(text.replace("[0.3, 0.7]", "[0.3, 1.5]"), encoding="utf-8")
-    result = call("generate", specification, "--out", tmp_path / "set", "--workers", 1)
-    assert result.exit_code == 0, result.output
+    result = succeed("generate", specification, "--out", tmp_path / "set", "--workers", 1)
     stated = json.loads((tmp_path / "set" / "manifest.json").read_text())
     again, strained, untouched = sum(stated["redrawn"].values()), stated["strained"], stated["untouched"]
     assert min(again, strained, untouched) > 0
     assert re.search(rf"\n{again} contours .*again: .*\d+ out of reach", result.stdout)
     assert re.search(rf"\n{strained} records .*strained", result.stdout)
     assert re.search(rf"\n{untouched} sweeps without .*contact\n", result.stdout)
-
-
-# --- Verify ---------------------------------------------------------------------------------------------------------
 
 
 def test_a_whole_data_set_is_verified(small):
@@ -251,9 +239,6 @@ def test_a_whole_data_set_is_verified(small):
     written, again = result.stdout.splitlines()
     assert written.startswith(f"{folder}: 6 records in 3 files, ")
     assert again.startswith("3 files made again")
-
-
-# --- Record ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("source", "suffix"), [("set", "csv"), ("small.toml", "nc")])

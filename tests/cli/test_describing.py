@@ -1,8 +1,6 @@
 """The command `rig`: what a file says, and what may be unknown."""
 
-import json
-
-from helpers.commands import call
+from helpers.commands import answered, call
 from tactile_bayes.rig.parameters import PARAMETERS, STANDARD, members
 
 SHEET = """
@@ -26,7 +24,7 @@ taper = "default"
 
 
 def test_every_parameter_is_listed_with_its_row():
-    answer = json.loads(call("rig", "--parameters", "--json").stdout)
+    answer = answered("rig", "--parameters")
     rows = {row["name"]: row for row in answer["parameters"]}
     assert list(rows) == list(PARAMETERS)
     for name, row in rows.items():
@@ -41,7 +39,7 @@ def test_every_parameter_is_listed_with_its_row():
 
 def test_a_file_is_said_in_words(rig_file):
     path = rig_file(SHEET)
-    said = json.loads(call("rig", path, "--json").stdout)
+    said = answered("rig", path)
     assert said["known"] == {"lever_x": 0.0, "lever_y": 0.0}
     assert said["said"]["lever_x"] == "known, 0"
     assert said["said"]["taper"] == "unknown, by default"

@@ -1,15 +1,13 @@
 """The command design, and the figure."""
 
 import csv
-import json
 import re
-from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from helpers import commands
+from helpers.commands import answered, call, succeed
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting import design as draw
@@ -20,16 +18,14 @@ ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--d
 
 
 @pytest.fixture(scope="module")
-def run(as_stated):
-    return partial(commands.call, *ASKED, "--rig", as_stated, "--workers", 1)
+def asked(as_stated):
+    return (*ASKED, "--rig", as_stated, "--workers", 1)
 
 
 @pytest.fixture(scope="module")
-def made(run, tmp_path_factory, coarse_pictures):
+def made(asked, tmp_path_factory, coarse_pictures):
     out = tmp_path_factory.mktemp("design")
-    result = run("--out", out, "--quiet")
-    assert result.exit_code == 0, result.output
-    return result, out
+    return succeed(*asked, "--out", out, "--quiet"), out
 
 
 def test_it_says_where_and_writes_what_it_found(made):
@@ -42,13 +38,12 @@ def test_it_says_where_and_writes_what_it_found(made):
     np.testing.assert_allclose(table["base_x"], [0.0, 0.2])
 
 
-def test_drives_that_carry_the_base_are_candidates(run, tmp_path):
+def test_drives_that_carry_the_base_are_candidates(asked, tmp_path):
     poses = tmp_path / "poses.csv"
     poses.write_text("x,y,drive_angle\n0.8,0,65\n0,0.05,85\n-0.8,0,115\n")
-    result = run("--carry", "0.8,0,180,65,1.6", "--carry", poses, "--out", tmp_path, "--json")
-    assert result.exit_code == 0, result.output
-    candidates = json.loads(result.stdout)["candidates"]
-    assert json.loads(result.stdout)["words"][0].startswith("Put the pivot")
+    answer = answered(*asked, "--carry", "0.8,0,180,65,1.6", "--carry", poses, "--out", tmp_path)
+    candidates = answer["candidates"]
+    assert answer["words"][0].startswith("Put the pivot")
     assert [one["is_pivot"] for one in candidates] == [True, True, False, False]
     assert candidates[0]["nested_width"] is None
     assert candidates[3]["drive"] == "carried from (0.8, 0) to (-0.8, 0) at 65° to 115°"
@@ -61,17 +56,14 @@ def test_drives_that_carry_the_base_are_candidates(run, tmp_path):
 
 @pytest.mark.parametrize(
     ("nested", "told"),
-    [
-        ([], "nothing was written.*starts again"),
-        (["--nested"], "no further candidate.*resumes"),
-    ],
+    [([], "nothing was written.*starts again"), (["--nested"], "no further candidate.*resumes")],
 )
-def test_an_interrupt_says_what_the_same_command_does(run, tmp_path, monkeypatch, nested, told):
+def test_an_interrupt_says_what_the_same_command_does(asked, tmp_path, monkeypatch, nested, told):
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("tactile_bayes.runs.design.design_into", interrupted)
-    result = run("--out", tmp_path, *nested)
+    result = call(*asked, "--out", tmp_path, *nested)
     assert result.exit_code == 130
     assert re.fullmatch(f"tactile-bayes: interrupted, {told}\n", result.stderr)
 

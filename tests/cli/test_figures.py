@@ -1,12 +1,9 @@
 """The command figures."""
 
-import json
-from functools import partial
-
 import pytest
 from PIL import Image
 
-from helpers import commands
+from helpers.commands import answered, call, succeed
 from tactile_bayes import paper_figures
 from tactile_bayes.paper_figures import caption
 
@@ -15,18 +12,14 @@ QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5",
 pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
-run = partial(commands.call, "figures")
-
-
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
     out = tmp_path_factory.mktemp("figures") / "new"
-    return run("--out", out, *QUICK, "--format", "png"), out
+    return succeed("figures", "--out", out, *QUICK, "--format", "png"), out
 
 
 def test_it_says_what_is_where(drawn):
     result, out = drawn
-    assert result.exit_code == 0, result.output
     assert result.stdout.splitlines() == [
         f"Figure 3: {caption(3, distances=[0.5])}",
         f"    {out / 'figure_03.png'}",
@@ -43,12 +36,8 @@ def test_figures_are_as_wide_as_a_page_at_print_resolution(drawn):
 
 
 def test_a_column_on_screen_as_json(tmp_path):
-    result = run(
-        "--out", tmp_path, "--only", 3, *QUICK[4:], "--format", "png", "--column", "--style", "screen", "--json"
-    )
-    assert result.exit_code == 0, result.output
-    answer = json.loads(result.stdout)
-    (only,) = answer["figures"]
+    options = ("--only", 3, *QUICK[4:], "--format", "png", "--column", "--style", "screen")
+    (only,) = answered("figures", "--out", tmp_path, *options)["figures"]
     assert only["number"] == 3
     assert only["files"] == {"png": str(tmp_path / "figure_03.png")}
     with Image.open(only["files"]["png"]) as image:
@@ -57,9 +46,8 @@ def test_a_column_on_screen_as_json(tmp_path):
 
 def test_noise_is_said_in_the_caption(tmp_path):
     noise = ["--force-noise", "0.05", "--moment-noise", "0.02", "--seed", "4"]
-    result = run("--out", tmp_path, "--only", 11, "--distance", 0.5, "--drive-step", 10, "--format", "svg", *noise)
-    assert result.exit_code == 0, result.output
-    assert "measured with noise (seed 4)" in result.stdout
+    options = ("--only", 11, "--distance", 0.5, "--drive-step", 10, "--format", "svg", *noise)
+    assert "measured with noise (seed 4)" in succeed("figures", "--out", tmp_path, *options).stdout
 
 
 def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
@@ -72,7 +60,7 @@ def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
         return make(number, **options)
 
     monkeypatch.setattr(paper_figures, "figure", interrupted)
-    result = run("--out", tmp_path, *QUICK, "--format", "svg")
+    result = call("figures", "--out", tmp_path, *QUICK, "--format", "svg")
     assert result.exit_code == 130
     assert f"1 of 2 figures are in {tmp_path}: " in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["figure_03.svg"]

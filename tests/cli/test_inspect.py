@@ -1,6 +1,5 @@
 """The commands `inspect` and `reconstruct`, and a laboratory's path from its own file to a contour."""
 
-import json
 import math
 import re
 import shlex
@@ -11,7 +10,7 @@ import pandas as pd
 import pytest
 
 import tactile_bayes as tb
-from helpers.commands import assert_refused, call
+from helpers.commands import answered, assert_refused, call, succeed
 from tactile_bayes.record import CHANNELS, write_record
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
@@ -55,9 +54,6 @@ def test_the_rigs_file_that_comes_with_the_package_is_like_it(rig):
 def inspected(rig, tmp_path_factory, coarse_pictures):
     folder = tmp_path_factory.mktemp("inspected") / "inspection"
     return call("inspect", rig, *READING, "--out", folder), folder
-
-
-# --- inspect --------------------------------------------------------------------------------------------------------
 
 
 def test_what_looks_wrong_comes_first_then_what_is_in_the_file(inspected, rig):
@@ -128,8 +124,7 @@ def test_what_an_option_says_of_a_file_is_read_back_from_the_rigs_file(measured,
     table.to_csv(tmp_path / "r.csv", index=False)
     rod = ("--length", ROD.length, "--flexural-rigidity", ROD.flexural_rigidity)
     column = ("--column", "holding_moment=2*Mz[N m]")
-    result = call("inspect", tmp_path / "r.csv", *rod, *column, *option, "--out", tmp_path / "found")
-    assert result.exit_code == 0, result.output
+    succeed("inspect", tmp_path / "r.csv", *rod, *column, *option, "--out", tmp_path / "found")
     record = tb.read_record(tmp_path / "r.csv", tb.Rig.read(tmp_path / "found" / "rig.toml"))
     assert record.attrs.get("load_cell_frame", "fixed") == (option[1] if "--frame" in option else "fixed")
     zero = 2 * np.abs(tb.inspect_record(measured).channels.bias[0])
@@ -150,9 +145,7 @@ def test_a_rigs_file_that_was_edited_is_not_replaced(rig, tmp_path):
 
 
 def test_json_has_the_same_in_numbers(rig):
-    result = call("inspect", rig, *READING, "--json")
-    assert result.exit_code == 0, result.output
-    answer = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    answer = answered("inspect", rig, *READING)
     assert answer["words"] == ["Nothing looks wrong."]
     assert answer["is_suspect"] is False
     assert answer["channels"][1]["bias"] == pytest.approx(4e-3, abs=5 * answer["channels"][1]["bias_uncertainty"])
@@ -203,12 +196,8 @@ def test_pivots_have_the_unit_of_the_record(tmp_path):
         assert max(map(len, sweeps)) <= 80
 
 
-# --- reconstruct ----------------------------------------------------------------------------------------------------
-
-
 def test_contact_points_of_a_rigs_file(inspected, rig, tmp_path):
-    result = call("reconstruct", rig, "--rig", inspected[1] / "rig.toml", "--out", tmp_path)
-    assert result.exit_code == 0, result.output
+    result = succeed("reconstruct", rig, "--rig", inspected[1] / "rig.toml", "--out", tmp_path)
     assert "constrained method" in result.stdout.splitlines()[0]
     assert "noise explains" in result.stdout
     assert (tmp_path / "contacts.png").read_bytes().startswith(b"\x89PNG\r\n")
@@ -220,7 +209,7 @@ def test_contact_points_of_a_rigs_file(inspected, rig, tmp_path):
 
 
 def test_a_data_sheet_tells_whether_noise_explains_the_misfit(measured, record, tmp_path):
-    answer = json.loads(call("reconstruct", record, "--out", tmp_path, "--json").stdout)
+    answer = answered("reconstruct", record, "--out", tmp_path)
     contacts = tb.reconstruct(measured, method="constrained")
     for name in ("misfit_sum", "misfit_samples", "misfit_probability", "axial_score"):
         assert answer[name] == pytest.approx(contacts.attrs[name])
@@ -259,12 +248,10 @@ def test_noise_that_cannot_be_known_is_not_said_to_be_none(rig, tmp_path):
     (tmp_path / "loaded.csv").write_text("\n".join([lines[0], *loaded]) + "\n", encoding="utf-8")
     inspected = call("inspect", tmp_path / "loaded.csv", *READING, "--out", tmp_path / "found")
     assert "too few unloaded samples" in inspected.stdout
-    result = call("reconstruct", tmp_path / "loaded.csv", "--rig", tmp_path / "found" / "rig.toml", "--out", tmp_path)
-    assert result.exit_code == 0, result.output
+    result = succeed(
+        "reconstruct", tmp_path / "loaded.csv", "--rig", tmp_path / "found" / "rig.toml", "--out", tmp_path
+    )
     assert re.search("too few .*--force-noise.*--moment", result.stdout)
-
-
-# --- From a rig's file to a contour -----------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -300,7 +287,7 @@ def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured
 @pytest.mark.slow
 def test_a_laboratorys_path_ends_at_the_truth(next_words):
     """At full length: each interval of 95 % holds the truth, up to half its width."""
-    answer = json.loads(call(*next_words, "--json").stdout)
+    answer = answered(*next_words)
     assert answer["converged"] is True
     rows = {row["quantity"]: row for row in answer["quantities"]}
     for name, truth in {"a": 2.5, "q": 0.1, "x_c": 0.0, "friction": 0.0}.items():
@@ -313,8 +300,7 @@ def test_inspect_lists_what_was_assumed_and_what_has_no_meaning(rig, tmp_path):
     path = tmp_path / "rig.csv"
     path.write_text("# see log\n# serial: 4711\n" + text.rstrip("\n"), encoding="utf-8")
     reading = [word.replace("[mN]", "") if isinstance(word, str) else word for word in READING]
-    result = call("inspect", path, *reading, "--json")
-    found = json.loads(result.stdout)
+    found = answered("inspect", path, *reading)
     assert found["not_used"] == ["serial", "line 1: see log"]
     end, units = found["reading"]
     assert "has no end" in end

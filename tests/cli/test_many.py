@@ -1,11 +1,10 @@
 """The command `infer` of several records."""
 
-import json
 from unittest import mock
 
 import pytest
 
-from helpers.commands import assert_misused, call
+from helpers.commands import answered, assert_misused, call, succeed
 from tactile_bayes.runs import many
 
 
@@ -24,8 +23,7 @@ def test_each_has_a_row_and_one_table(quick, record, as_stated, tmp_path):
     other.write_bytes(record.read_bytes())
     names = [f"{record.parent.name}-record", "b-record"]  # the same but for the folder
     options = ("--rig", as_stated, "--force-noise", 0.04, "--max-seconds", 3, "--out", tmp_path / "runs")
-    result = call("infer", record, other, *options)
-    assert result.exit_code == 0, result.output
+    result = succeed("infer", record, other, *options)
     assert [line.split()[0] for line in result.stdout.splitlines()[1:3]] == names
     assert "0.500" in result.stdout
     assert (tmp_path / "runs" / "runs.csv").is_file()
@@ -39,7 +37,5 @@ def test_a_folder_is_all_records_in_it_and_programs_get_the_table(quick, record,
     folder = tmp_path / "day"
     folder.mkdir()
     (folder / "one.csv").write_bytes(record.read_bytes())
-    result = call("infer", folder, "--out", tmp_path / "runs", "--json")
-    assert result.exit_code == 0, result.output
-    assert json.loads(result.stdout)["records"]["verdict"]["data"] == ["All is well."]
+    assert answered("infer", folder, "--out", tmp_path / "runs")["records"]["verdict"]["data"] == ["All is well."]
     assert_misused(call("infer", folder, "--checkpoint", tmp_path / "steps", "--out", tmp_path / "x"), "for one record")

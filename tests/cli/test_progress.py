@@ -5,15 +5,12 @@ import pty
 import re
 import signal
 import sys
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 
 import pytest
 import typer
 
-from helpers import commands
-from helpers.report_pages import analysed_quickly, coarse_record
 from tactile_bayes.cli.progress import resumable_bar, step_bar
-from tactile_bayes.rig import Rig
 from tactile_bayes.tasks import TaskProgress
 
 
@@ -86,25 +83,3 @@ def test_a_termination_that_the_sampler_answers_is_still_one():
     with pytest.raises(typer.Exit) as ended, resumable_bar("replicate", True, None):
         sampler()
     assert ended.value.exit_code == 143
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarse_pictures")
-def test_commands_show_their_steps(tmp_path, monkeypatch):
-    ideal, measured, run = tmp_path / "ideal.csv", tmp_path / "measured.csv", tmp_path / "run"
-    analysed_quickly(coarse_record(), run, rig=Rig(unknown="nothing"))
-    noise = ("--force-noise", 0.05, "--moment-noise", 0.02)
-    for module, words, expected in (
-        ("scanning", ("scan", "--out", ideal, "--drive-step", 8, "--figure", tmp_path / "sweep.png"), [(1, 3), (2, 3)]),
-        ("measurement", ("measure", ideal, *noise, "--out", measured), [(1, 2)]),
-        ("inspection", ("inspect", measured), [(1, 3), (2, 3), (3, 3)]),
-        ("reconstruction", ("reconstruct", measured, "--out", tmp_path / "contacts"), [(1, 2)]),
-        ("report", ("report", run), [(done, 5) for done in range(1, 6)]),
-    ):
-        steps = []
-        monkeypatch.setattr(
-            f"tactile_bayes.cli.{module}.step_bar", lambda quiet, to=steps: nullcontext(lambda *step: to.append(step))
-        )
-        result = commands.call(*words)
-        assert result.exit_code == 0, result.output
-        assert steps == expected, module

@@ -97,8 +97,7 @@ def test_a_record_that_is_not_there_yet_is_not_replaced_either(tmp_path):
 def test_a_folder_beside_the_inputs_is_taken(record, tmp_path):
     path = tmp_path / "samples.csv"
     path.write_bytes(record.read_bytes())
-    result = commands.call("inspect", path, "--out", tmp_path / "inspection", "--quiet")
-    assert result.exit_code == 0, result.output
+    commands.succeed("inspect", path, "--out", tmp_path / "inspection", "--quiet")
     assert path.read_bytes() == record.read_bytes()
     assert (tmp_path / "inspection" / "samples.csv").exists()
 

@@ -1,6 +1,5 @@
 """The command report."""
 
-import json
 import shlex
 from functools import partial
 
@@ -15,6 +14,8 @@ from tactile_bayes.uncertainty import contour_band, overlay_distance, read_overl
 from tactile_bayes.uncertainty.rod_reach import reach
 
 call = partial(commands.call, "report")
+answered = partial(commands.answered, "report")
+succeed = partial(commands.succeed, "report")
 
 
 @pytest.fixture(scope="module")
@@ -25,15 +26,14 @@ def folder(tmp_path_factory):
 
 
 def test_it_writes_the_page_into_the_run_or_where_it_is_told(folder, tmp_path):
-    result = call(folder)
-    assert result.exit_code == 0, result.output
+    result = succeed(folder)
     path, out = folder / "report.html", tmp_path / "page.html"
     assert result.stdout.startswith(f"{path} ({path.stat().st_size / 1e3:.0f} kB): ")
     assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     result = call(folder, "--out", out, "--quiet")
     assert result.stdout == f"{out}\n"
     assert out.read_bytes() == path.read_bytes()
-    answer = json.loads(call(folder, "--out", out, "--json").stdout)
+    answer = answered(folder, "--out", out)
     assert answer == {"report": str(out), "bytes": out.stat().st_size}
 
 
@@ -53,9 +53,8 @@ def test_a_contour_is_laid_over_it_and_drawn_beside_the_page(folder, tmp_path):
     """The file stays as it is where the figure would replace it."""
     points = tmp_path / "drawn.csv"
     points.write_text("x,y\n" + "".join(f"{x / 10},0.5\n" for x in range(-5, 6)), encoding="utf-8")
-    result = call(folder, "--overlay", points, "--out", tmp_path / "page.html", "--json")
     figure = tmp_path / "overlay.png"
-    said = json.loads(result.stdout)["overlay"]
+    said = answered(folder, "--overlay", points, "--out", tmp_path / "page.html")["overlay"]
     assert said["figure"] == str(figure)
     posterior = read_result(folder / "posterior.nc")
     band = contour_band(posterior, reach(posterior), 0.95)

@@ -1,6 +1,5 @@
 """The commands `scan` and `measure`: ideal records, and what a load cell makes of them."""
 
-import json
 import math
 
 import numpy as np
@@ -8,28 +7,17 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from helpers.commands import assert_refused, call
+from helpers.commands import answered, assert_refused, call, succeed
 from tactile_bayes.rig import Rig
 
 COARSE = ["--drive-step", 10]
 FLANKS = [f"--parameter={number}" for number in ("left_a=0.5", "right_w=1", "right_n=4", "q=0.5")]
 
 
-def told(*arguments):
-    """The JSON object that a command answers with."""
-    result = call(*arguments, "--json")
-    assert result.exit_code == 0, result.output
-    assert result.stderr == ""
-    return json.loads(result.stdout)
-
-
 @pytest.fixture(scope="module")
 def ideal(tmp_path_factory):
     path = tmp_path_factory.mktemp("ideal") / "ideal.csv"
     return path, call("scan", "--profile", "II", "--distance", 0.5, "--drive-step", 2, "--out", path)
-
-
-# --- scan -----------------------------------------------------------------------------------------------------------
 
 
 def test_a_scan_prints_its_events_and_writes_the_record(ideal):
@@ -58,16 +46,16 @@ def test_a_scan_prints_its_events_and_writes_the_record(ideal):
     ],
 )
 def test_contours_are_chosen_by_options(tmp_path, options, contour):
-    answer = told("scan", *options, *COARSE, "--direction", "forward", "--out", tmp_path / "r.nc")
+    answer = answered("scan", *options, *COARSE, "--direction", "forward", "--out", tmp_path / "r.nc")
     assert answer["contour"].startswith(contour)
     assert [sweep["direction"] for sweep in answer["sweeps"]] == ["forward"]
 
 
 def test_a_scan_in_si_is_of_a_contour_in_metres(tmp_path, rig_file):
     rod = ["--rig", rig_file('[rod]\nlength = "200 mm"\nflexural_rigidity = 1e-3\n')]
-    of_profile = told("scan", "--profile", "II", *rod, *COARSE, "--out", tmp_path / "1.csv")
+    of_profile = answered("scan", "--profile", "II", *rod, *COARSE, "--out", tmp_path / "1.csv")
     family = ["--family", "parabola", "--parameter", "a=2.5", "--parameter", "q=0.1"]
-    of_family = told("scan", *family, *rod, *COARSE, "--out", tmp_path / "2.csv")
+    of_family = answered("scan", *family, *rod, *COARSE, "--out", tmp_path / "2.csv")
     assert of_profile["sweeps"] == of_family["sweeps"]
     assert of_profile["units"] == "SI"
     assert of_profile["rod"]["length"] == 0.2
@@ -88,8 +76,8 @@ def test_measured_points_are_scanned(tmp_path):
     points = tmp_path / "points.csv"
     points.write_text("\n".join(["# from a probe", "y [L];x [L]", *lines]), encoding="utf-8")
     forward = ["--direction", "forward", *COARSE]
-    found = told("scan", "--points", points, *forward, "--out", tmp_path / "r.csv")
-    exact = told("scan", "--profile", "II", *forward, "--out", tmp_path / "e.csv")
+    found = answered("scan", "--points", points, *forward, "--out", tmp_path / "r.csv")
+    exact = answered("scan", "--profile", "II", *forward, "--out", tmp_path / "e.csv")
     one, other = (answer["sweeps"][0]["snap_off"]["drive_angle"] for answer in (found, exact))
     assert one == pytest.approx(other, abs=1e-4)
 
@@ -99,34 +87,26 @@ def test_a_scan_from_two_pivots_is_drawn(tmp_path):
     """Into folders that are made for its files."""
     pivots = ["--base", "0,0", "--base", "0.2,0"]
     out, figure = tmp_path / "a" / "b" / "r.csv", tmp_path / "c" / "scan.png"
-    answer = told("scan", *pivots, *COARSE, "--out", out, "--figure", figure)
+    answer = answered("scan", *pivots, *COARSE, "--out", out, "--figure", figure)
     assert [sweep["base"] for sweep in answer["sweeps"]] == [[0.0, 0.0], [0.0, 0.0], [0.2, 0.0], [0.2, 0.0]]
     assert figure.read_bytes().startswith(b"\x89PNG\r\n")
     assert out.is_file()
-
-
-# --- measure --------------------------------------------------------------------------------------------------------
 
 
 def test_a_load_cell_measures_an_ideal_record(ideal, tmp_path, rig_file):
     cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.0, 0.1, -0.1), drive_angle_noise=math.radians(0.1))
     rig = rig_file('[load_cell]\nforce_noise = 0.3\nbias = [0.0, 0.1, -0.1]\ndrive_angle_noise = "0.1 deg"\n')
     noise = ["--rig", rig, "--force-noise", 0.05, "--moment-noise", 0.02]
-    result = call("measure", ideal[0], *noise, "--seed", 3, "--out", tmp_path / "m.csv")
-    assert result.exit_code == 0, result.output
+    result = succeed("measure", ideal[0], *noise, "--seed", 3, "--out", tmp_path / "m.csv")
     assert "without columns of the truth" in result.stdout
     expected = cell.measure(tb.read_record(ideal[0]), rng=3)
     found = tb.read_record(tmp_path / "m.csv")
     assert tb.LoadCell.from_record(found) == cell
     assert not [name for name in found.data_vars if name.startswith("truth_")]
     xr.testing.assert_equal(found, expected[list(found.data_vars)])
-
-
-def test_the_truth_is_kept_if_asked(ideal, tmp_path):
-    out = tmp_path / "d" / "m.nc"
-    call("measure", ideal[0], "--force-noise", 0.1, "--moment-noise", 0.1, "--keep-truth", "--out", out)
-    found = tb.read_record(out)
-    xr.testing.assert_equal(found.truth_force_x.drop_attrs(), tb.read_record(ideal[0]).force_x.drop_attrs())
+    call("measure", ideal[0], *noise, "--keep-truth", "--out", tmp_path / "d" / "m.nc")
+    kept = tb.read_record(tmp_path / "d" / "m.nc")
+    xr.testing.assert_equal(kept.truth_force_x.drop_attrs(), tb.read_record(ideal[0]).force_x.drop_attrs())
 
 
 def test_a_record_is_not_measured_twice_unless_it_states_no_load_cell(ideal, tmp_path):
@@ -139,7 +119,7 @@ def test_a_record_is_not_measured_twice_unless_it_states_no_load_cell(ideal, tmp
     noisy = tb.read_record(tmp_path / "m.csv")
     noisy.attrs = {name: value for name, value in noisy.attrs.items() if not name.startswith("load_cell_")}
     tb.write_record(noisy, tmp_path / "noisy.csv")
-    told("measure", tmp_path / "noisy.csv", *noise, "--out", tmp_path / "mm.csv")
+    answered("measure", tmp_path / "noisy.csv", *noise, "--out", tmp_path / "mm.csv")
 
 
 def test_a_measured_scan_states_the_data_sheets_and_deviates_once(tmp_path, rig_file):
@@ -151,9 +131,8 @@ def test_a_measured_scan_states_the_data_sheets_and_deviates_once(tmp_path, rig_
     assert call("measure", ideal, "--rig", rig, "--out", file).exit_code == 0
     stated, exact, record = tb.Rig.read(rig), tb.read_record(ideal), tb.read_record(file)
     assert record.attrs["rod_flexural_rigidity"] == 0.0024
-    assert {n for n in record.attrs if n.startswith("load_cell_")} == {
-        "load_cell_frame", "load_cell_force_noise", "load_cell_moment_noise",
-    }  # fmt: skip
+    stated_of_cell = {name for name in record.attrs if name.startswith("load_cell_")}
+    assert stated_of_cell == {f"load_cell_{name}" for name in ("frame", "force_noise", "moment_noise")}
     np.testing.assert_allclose(record.force_y, exact.force_y, rtol=0, atol=1e-5)
     again = stated.measure(exact, rng=1)
     np.testing.assert_allclose(record.holding_moment, again.holding_moment, rtol=0, atol=1e-15)

@@ -1,7 +1,6 @@
 """The command `sensitivity`, as a user calls it."""
 
 import importlib
-import json
 from functools import partial
 
 import numpy as np
@@ -25,6 +24,8 @@ FIGURES = {"amplification.png", "information.png", "noise_shares.png", "required
 
 
 call = partial(commands.call, "sensitivity")
+answered = partial(commands.answered, "sensitivity")
+succeed = partial(commands.succeed, "sensitivity")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -39,8 +40,7 @@ def few_samples():
 def done(tmp_path_factory, coarse_pictures):
     """An analysis with a study, and what was said of it."""
     out = tmp_path_factory.mktemp("sensitivity") / "run"
-    result = call("--out", out, *STUDY, *QUICK)
-    assert result.exit_code == 0, result.output
+    result = succeed("--out", out, *STUDY, *QUICK)
     return out, result.stdout
 
 
@@ -68,9 +68,6 @@ def asked(monkeypatch, analysed):
     monkeypatch.setattr(sensitivity_run.Folder, "draw", lambda *arguments: None)
     monkeypatch.setattr(error_map_module, "error_cell", cell)
     return given
-
-
-# --- What it says ---------------------------------------------------------------------------------------------------
 
 
 def test_words_come_first_then_bounds_then_the_files(done, analysed):
@@ -109,9 +106,7 @@ def test_files_hold_what_was_found(done, analysed):
 
 
 def test_json_has_the_words_and_the_numbers(asked, analysed, tmp_path):
-    result = call("--out", tmp_path, "--json", *STUDY)
-    assert result.exit_code == 0, result.output
-    answer = json.loads(result.stdout)
+    answer = answered("--out", tmp_path, *STUDY)
     assert answer["words"] == analysed.attrs["words"].splitlines()
     told = analysed["information"].to_dataset()
     assert answer["parameters"]["a"] == {
@@ -127,9 +122,6 @@ def test_json_has_the_words_and_the_numbers(asked, analysed, tmp_path):
     assert [cell["noise_factor"] for cell in answer["study"]] == [0.3, 1.0]
     assert {cell["rms_across"] for cell in answer["study"]} == {0.01}
     assert {cell["expected_gap_width"] for cell in answer["study"]} == {None}
-
-
-# --- What it asks for -----------------------------------------------------------------------------------------------
 
 
 def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
@@ -162,10 +154,8 @@ def test_rig_and_options_arrive(asked, tmp_path, rig_file):
 def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path):
     assert call("--out", tmp_path / "one", "--profile", "III", "--distance", 0.6, *STUDY).exit_code == 0
     (study, _), *_ = asked["cells"]
-    assert [(cell.contour, cell.distance, cell.noise_factor) for cell in study.cells] == [
-        ("III", 0.6, 0.3),
-        ("III", 0.6, 1.0),
-    ]
+    cells = [(cell.contour, cell.distance, cell.noise_factor) for cell in study.cells]
+    assert cells == [("III", 0.6, 0.3), ("III", 0.6, 1.0)]
     assert study.replicates == 1
     asked["cells"].clear()
     more = ("--profile", "I", "--profile", "II", "--distance", 0.3, "--distance", 0.5)
@@ -174,18 +164,13 @@ def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path)
     assert len(study.cells) == 8
 
 
-# --- The best rod ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_the_best_rod_of_a_material_is_found(tmp_path, rig_file, monkeypatch):
     monkeypatch.setattr(sensitivity_run, "_LENGTHS", np.array([1.0]))
     monkeypatch.setattr(sensitivity_run, "_DIAMETERS", np.array([0.7, 1.0, 2.0]))
     rod = "length = 0.2\nflexural_rigidity = 2.4279e-3\ndiameter = 0.7e-3\nelastic_strain = 0.01\n"
     rig = rig_file(f"[rod]\n{rod}[load_cell]\nforce_noise = 3e-3\nmoment_noise = 0.25e-3\n")
-    result = call("--out", tmp_path, "--rig", rig, "--best-rod", *QUICK, "--json")
-    assert result.exit_code == 0, result.output
-    answer = json.loads(result.stdout)
+    answer = answered("--out", tmp_path, "--rig", rig, "--best-rod", *QUICK)
     assert answer["rod"]["length"] == pytest.approx(0.2)
     assert answer["rod"]["diameter"] == pytest.approx(0.7e-3, rel=1e-3)  # of music wire of this stiffness
     said = ("3 rods", "(1 bent too far)", "200 mm", "0.7 mm")

@@ -1,8 +1,5 @@
 """The command trust, and what the report says of it."""
 
-import json
-from functools import partial
-
 import pytest
 
 from helpers import commands
@@ -10,8 +7,6 @@ from helpers.contour_posteriors import posterior
 from helpers.report_pages import Page
 from tactile_bayes.inference.result import write_result
 from tactile_bayes.runs.names import OF_POSTERIOR
-
-call = partial(commands.call, "trust")
 
 
 @pytest.fixture(scope="module")
@@ -24,23 +19,18 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def written(folder):
-    return call(folder, "--replicates", 1, "--no-assumptions", "--workers", 1, "--json")
+    return commands.answered("trust", folder, "--replicates", 1, "--no-assumptions", "--workers", 1)
 
 
 def test_it_prints_one_object_and_writes_into_the_run(folder, written):
-    assert written.exit_code == 0, written.output
-    said = json.loads(written.stdout)
-    assert said["conclusion"] == "holds"
-    assert "0.95 holds" in said["words"][0]
-    assert said["parts"][0]["part"] == "sweep 1"
-    assert {claim["claim"] for claim in said["claims"]} >= {"pointwise_in_gap", "contact_region"}
-    assert said["files"] == {"trust": str(folder / "trust.nc"), "words": str(folder / "trust.txt")}
-    assert (folder / "trust.txt").read_text(encoding="utf-8").splitlines()[0] == said["words"][0]
-    assert {name for name in OF_POSTERIOR if (folder / name).exists()} == {
-        "trust.nc",
-        "trust.txt",
-        "trust/replicates.json",
-    }
+    assert written["conclusion"] == "holds"
+    assert "0.95 holds" in written["words"][0]
+    assert written["parts"][0]["part"] == "sweep 1"
+    assert {claim["claim"] for claim in written["claims"]} >= {"pointwise_in_gap", "contact_region"}
+    assert written["files"] == {"trust": str(folder / "trust.nc"), "words": str(folder / "trust.txt")}
+    assert (folder / "trust.txt").read_text(encoding="utf-8").splitlines()[0] == written["words"][0]
+    names = {name for name in OF_POSTERIOR if (folder / name).exists()}
+    assert names == {"trust.nc", "trust.txt", "trust/replicates.json"}
 
 
 @pytest.mark.usefixtures("written")

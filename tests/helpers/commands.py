@@ -1,7 +1,9 @@
 """Calls of the command line, and what a refusal looks like."""
 
+import json
 import re
 
+import pytest
 from typer.testing import CliRunner
 
 from tactile_bayes.cli import app
@@ -9,6 +11,19 @@ from tactile_bayes.cli import app
 
 def call(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def succeed(*arguments):
+    """The result of a call that ends well."""
+    result = call(*arguments)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def answered(*arguments):
+    """The JSON object that a call answers with."""
+    result = succeed(*arguments, "--json")
+    return json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
 def assert_refused(result, *fragments):

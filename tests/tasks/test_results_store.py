@@ -35,9 +35,6 @@ def left_alone(folder, *named, words=WORDS):
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
-# ---- what is written is read
-
-
 def test_what_is_written_is_read(tmp_path):
     file = filled(tmp_path / "made" / "on the way")
     assert [path.name for path in file.parent.iterdir()] == [LEDGER]
@@ -74,9 +71,6 @@ def test_without_a_folder_it_is_kept_in_memory(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-# ---- whatever happens
-
-
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_what_is_done_is_written_however_the_block_ends(tmp_path, error):
     block = open_results_store(WORDS, tmp_path, REPLICATES)
@@ -90,9 +84,6 @@ def test_one_run_at_a_time(tmp_path):
     with open_results_store(WORDS, tmp_path, REPLICATES), refused(CalibrationError, "another run", tmp_path):
         open_results_store(WORDS, tmp_path, REPLICATES).__enter__()
     filled(tmp_path)
-
-
-# ---- what is refused
 
 
 def test_another_experiment_is_refused(tmp_path):
