@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import traceback
 import warnings
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from tactile_bayes.cli.analysis import demo, infer
+from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.calibration import calibrate
 from tactile_bayes.cli.command import as_command
 from tactile_bayes.cli.comparison import compare
@@ -31,11 +33,6 @@ from tactile_bayes.cli.trust import trust
 from tactile_bayes.cli.watching import watch
 from tactile_bayes.errors import TactileBayesError, TactileBayesWarning
 from tactile_bayes.matplotlib_defaults import ignore_user_settings
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tactile_bayes.cli.answer import Answer
 
 
 class _Commands(TyperGroup):

@@ -10,19 +10,17 @@ with `Reads` may be a path. An output that is an input is refused before the fun
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
 from typer.models import ParameterInfo
 
 from tactile_bayes.cli.answer import Answer, print_answer
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 Out = Annotated[Path, "Folder for results; created if missing."]
 Seed = Annotated[int, "Seed of random numbers; the same seed gives the same numbers.", typer.Option(min=0)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -55,24 +56,17 @@ class _FileOptions(RigOptions):
         from tactile_bayes.load_cell import LoadCell
 
         rig = super().stated
+        columns = assigned("--column", self.column, "COLUMN=NAME[UNIT], like force_x=Fx[mN]")
         file = replace(
             rig.format,
-            columns={
-                **rig.format.columns,
-                **assigned("--column", self.column, "COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
-            },
+            columns={**rig.format.columns, **columns},
             split_sweeps=self.split_sweeps or rig.format.split_sweeps,
             missing=(*rig.format.missing, *(self.missing or ())),
         )
         cell = rig.load_cell
-        return replace(
-            rig, file=file, load_cell=replace(cell or LoadCell(), frame=self.frame) if self.frame is not None else cell
-        )
-
-    @property
-    def describes_file(self) -> bool:
-        """True if an option says how the file is written, which only rig.toml can say to other commands."""
-        return bool(self.column or self.split_sweeps or self.missing or self.frame)
+        if self.frame is not None:
+            cell = replace(cell or LoadCell(), frame=self.frame)
+        return replace(rig, file=file, load_cell=cell)
 
 
 def inspect(
@@ -90,8 +84,6 @@ def inspect(
     the unloaded samples if nobody states them. The last line is the next command.
     """
     with step_bar(output.is_silent) as show:
-        import warnings
-
         from tactile_bayes.diagnostics.inspection import inspect_record
 
         with warnings.catch_warnings():
@@ -105,7 +97,9 @@ def inspect(
         if out is not None:
             from tactile_bayes.runs.inspection import write_inspection
 
-            files = write_inspection(found, out, text=["", *contents], rig=_to_write(of_record, rig))
+            if of_record.load_cell is None:  # the frame is stated without one, too
+                of_record = replace(of_record, load_cell=rig.stated.load_cell)
+            files = write_inspection(found, out, text=["", *contents], rig=of_record)
     again = _next_command(record, rig, out)
     return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files) | beside)
 
@@ -132,18 +126,12 @@ def _beside(record: xr.Dataset) -> dict[str, list[str]]:
     }
 
 
-def _to_write(rig: Rig, options: _FileOptions) -> Rig:
-    """Return the rig of a record with its frame, which is stated even if there is no load cell beside it."""
-    stated = options.stated.load_cell
-    return rig if rig.load_cell is not None else replace(rig, load_cell=stated)
-
-
 def _next_command(record: Path, rig: _FileOptions, out: Path | None) -> str:
     """Return the command that goes on: infer, or again inspect where only its options say how the file is written."""
     path = shlex.quote(str(record))
     if out is not None:
         return f"tactile-bayes infer {path} --rig {shlex.quote(str(out / 'rig.toml'))} --out run/"
-    if rig.describes_file:
+    if rig.column or rig.split_sweeps or rig.missing or rig.frame:
         return f"tactile-bayes inspect {path}{_as_options(rig)} --out inspection/"
     return f"tactile-bayes infer {path}{_as_options(rig)} --out run/"
 
@@ -190,10 +178,7 @@ def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
 
 
 def _sweeps(sweeps: xr.Dataset) -> Table:
-    """Return the table of sweeps; events lie midway between the samples beside them.
-
-    Angles are in degrees, and travels of a base that is carried in mm or rod lengths, with their unit.
-    """
+    """Return the table of sweeps; events lie midway between the samples beside them."""
     import numpy as np
 
     pivots = [f"{x:g},{y:g}" for x, y in zip(sweeps.base_x.values, sweeps.base_y.values, strict=True)]
@@ -277,11 +262,13 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
 
 def _suspicious(samples: xr.Dataset) -> dict[str, Any]:
     """Return the numbers of suspicious samples by kind, and by channel if a kind has channels."""
-    by_channel = {
-        kind: {
-            str(channel): samples[kind].sel(channel=channel).values.nonzero()[0].tolist()
-            for channel in samples.channel.values
-        }
-        for kind in ("outlier", "stuck", "cut_off")
-    }
-    return {**by_channel, **{kind: samples[kind].values.nonzero()[0].tolist() for kind in ("repeated", "uneven_step")}}
+    import numpy as np
+
+    numbers: dict[str, Any] = {}
+    for kind in ("outlier", "stuck", "cut_off", "repeated", "uneven_step"):
+        flags = samples[kind]
+        if "channel" in flags.dims:
+            numbers[kind] = {str(one): np.flatnonzero(flags.sel(channel=one)) for one in flags.channel.values}
+        else:
+            numbers[kind] = np.flatnonzero(flags)
+    return numbers

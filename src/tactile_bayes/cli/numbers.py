@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Sequence
 
 from tactile_bayes.errors import ParameterError
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
 
 
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:

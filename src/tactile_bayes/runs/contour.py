@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -275,11 +275,6 @@ class _Figures:
         return [name for name in family_named(self.result.attrs["family"]).parameters if name in self.names]
 
     @cached_property
-    def directions(self) -> list[Literal["forward", "backward"]]:
-        swept = self.result["events"].segment.values if "events" in self.result.children else []
-        return [direction for direction in ("forward", "backward") if direction in swept]
-
-    @cached_property
     def base(self) -> tuple[float, float]:
         return float(self.measured.base_x[0]), float(self.measured.base_y[0])
 
@@ -296,7 +291,9 @@ class _Figures:
         rig = Rig(rod_with(rod_of(self.measured), found), unknown=acting)
         if carried_sweeps(self.measured):
             return scan(contour, rig, drive=recorded_drives(self.measured))
-        direction = "both" if len(self.directions) == 2 else self.directions[0]
+        swept = self.result["events"].segment.values if "events" in self.result.children else []
+        directions = [direction for direction in ("forward", "backward") if direction in swept]
+        direction: Any = "both" if len(directions) == 2 else directions[0]
         return scan(contour, rig, direction=direction, base=self.base)
 
     def predictive(self) -> Any:
@@ -312,15 +309,10 @@ class _Figures:
         return axes
 
     def rods(self) -> Any:
-        if carried_sweeps(self.measured):
-            count = len(self.fitted.sweeps)
-            axes = panels(count, 1, 8.5, 4.0 * count)  # maps of a base that moves are wide
-            for number, ax in enumerate(axes[:, 0]):
-                plotting.rods(self.fitted, sweep=number, ax=ax)
-            return axes
-        axes = panels(len(self.directions), 1, 7.0, 4.0 * len(self.directions))
-        for direction, ax in zip(self.directions, axes[:, 0], strict=True):
-            plotting.rods(self.fitted, direction=direction, ax=ax)
+        count, width = len(self.fitted.sweeps), 8.5 if carried_sweeps(self.measured) else 7.0
+        axes = panels(count, 1, width, 4.0 * count)  # maps of a base that moves are wide
+        for number, ax in enumerate(axes[:, 0]):
+            plotting.rods(self.fitted, sweep=number, ax=ax)
         return axes
 
     def contour(self) -> Any:

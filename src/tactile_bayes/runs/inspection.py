@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.diagnostics.inspection import Inspection
@@ -29,29 +30,23 @@ def write_inspection(
         with folder.file("rig", "rig.toml") as temporary:
             temporary.write_text(rig_file, encoding="utf-8", newline="\n")
         folder.write_lines("words", "inspection.txt", (*inspection.messages, *text))
-        sweeps = inspection.sweeps
-        named = {f"{event}_drive_angle": event for event in ("onset", "snap_off")}
-        named |= {name: name for name in ("onset_travel", "snap_off_travel") if name in sweeps}
-        sides = {
-            f"{short}_{side}": sweeps[name].sel(side=side, drop=True)
-            for name, short in named.items()
-            for side in ("before", "after")
-        }
-        flat = sweeps.drop_vars(["side", *named]).assign(sides)
-        folder.write_table("sweeps", "sweeps.csv", flat)
+        events = {f"{event}_drive_angle": event for event in ("onset", "snap_off")}
+        folder.write_table("sweeps", "sweeps.csv", _spread(inspection.sweeps.rename(events), "side"))
         folder.write_table("channels", "channels.csv", inspection.channels)
-        flags = inspection.samples
-        by_channel = {
-            f"{name}_{channel}": flags[name].sel(channel=channel, drop=True)
-            for name in ("outlier", "stuck", "cut_off")
-            for channel in flags.channel.values
-        }
-        samples = flags.drop_vars(["outlier", "stuck", "cut_off", "channel"]).assign(by_channel)
+        samples = _spread(inspection.samples, "channel")
         kept = inspection.record[["sweep", "drive_angle"]].drop_attrs(deep=False)
         numbers = {name: values.astype(int) if values.dtype == np.bool_ else values for name, values in samples.items()}
         folder.write_table("samples", "samples.csv", kept.assign(numbers))
         folder.draw("figure", "inspection.png", plotting.inspection, inspection)
     return folder.files
+
+
+def _spread(table: xr.Dataset, dim: str) -> xr.Dataset:
+    """Return a table in which each variable along a dimension is one for each label of it."""
+    along = {name: values for name, values in table.data_vars.items() if dim in values.dims}
+    labels = table[dim].values.tolist()
+    columns = {f"{name}_{one}": values.sel({dim: one}, drop=True) for name, values in along.items() for one in labels}
+    return table.drop_dims(dim).assign(columns)
 
 
 def _rig_file(inspection: Inspection, rig: Rig) -> str:

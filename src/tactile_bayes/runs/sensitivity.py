@@ -12,12 +12,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes import plotting
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import sensitivity
-from tactile_bayes.rig.rig import rig_of
 from tactile_bayes.runs.design import outermost
 from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.names import SENSITIVITY, STUDY
@@ -52,16 +50,12 @@ def sensitivity_into(
     *,
     material: Material | None = None,
     study: Mapping[str, Any] | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int], object] = lambda done: None,
     **options: Any,
 ) -> SensitivityRun:
     """Analyse the effects of the sensor's errors, and write the results to a folder."""
-    rig = rig_of(options.get("rig"))
-    if material is not None and (rig.rod is None or rig.load_cell is None):
-        raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
-    report = progress or (lambda done: None)
     found = sensitivity(**options)
-    report(1)
+    progress(1)
     rods, studied = None, None
     with Folder(out, SENSITIVITY) as folder:
         folder.write_netcdf("sensitivity", "sensitivity.nc", found)
@@ -70,7 +64,7 @@ def sensitivity_into(
             folder.draw(part, f"{part}.png", draw, found)
         words = [found.attrs["words"]]
         if material is not None:
-            rods = _rods(material, options, lambda rod: report(1 + rod.done))
+            rods = _rods(material, options, lambda rod: progress(1 + rod.done))
             folder.write_netcdf("rods", "rods.nc", rods)
             folder.draw("required_rod", "required_rod.png", plotting.required_rod, rods)
             words.append(rod_message(rods))
