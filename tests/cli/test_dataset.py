@@ -137,17 +137,6 @@ def test_what_was_made_is_said_in_three_lines_and_not_made_again(small):
     assert re.search(r"existed already.* dataset verify ", result.stdout.splitlines()[0])
 
 
-def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification, tmp_path, monkeypatch):
-    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
-    monkeypatch.setenv("COLUMNS", "120")
-    arguments = ("generate", specification, "--workers", 1, "--out")
-    result = succeed(*arguments, tmp_path / "1")
-    assert "6 of 6 records" in result.stderr
-    assert "left" in result.stderr
-    assert "left" not in result.stdout
-    assert call(*arguments, tmp_path / "2", "--quiet").stderr == ""
-
-
 @pytest.mark.parametrize(
     ("words", "change", "named"),
     [

@@ -3,8 +3,7 @@
 import pytest
 from PIL import Image
 
-from helpers.commands import answered, call, succeed
-from tactile_bayes import paper_figures
+from helpers.commands import answered, succeed
 from tactile_bayes.paper_figures import caption
 
 QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5", "--rods", "3"]
@@ -48,19 +47,3 @@ def test_noise_is_said_in_the_caption(tmp_path):
     noise = ["--force-noise", "0.05", "--moment-noise", "0.02", "--seed", "4"]
     options = ("--only", 11, "--distance", 0.5, "--drive-step", 10, "--format", "svg", *noise)
     assert "measured with noise (seed 4)" in succeed("figures", "--out", tmp_path, *options).stdout
-
-
-def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
-    make, made = paper_figures.figure, []
-
-    def interrupted(number, **options):
-        if made:
-            raise KeyboardInterrupt
-        made.append(number)
-        return make(number, **options)
-
-    monkeypatch.setattr(paper_figures, "figure", interrupted)
-    result = call("figures", "--out", tmp_path, *QUICK, "--format", "svg")
-    assert result.exit_code == 130
-    assert f"1 of 2 figures are in {tmp_path}: " in result.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["figure_03.svg"]

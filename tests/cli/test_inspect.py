@@ -254,40 +254,11 @@ def test_noise_that_cannot_be_known_is_not_said_to_be_none(rig, tmp_path):
     assert re.search("too few .*--force-noise.*--moment", result.stdout)
 
 
-@pytest.fixture
-def next_words(inspected, tmp_path):
-    """The words of the command that inspect names, with a folder of the test."""
-    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
-    return [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
-
-
-def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured(next_words, tmp_path, monkeypatch):
-    """In SI, with signs and sweeps; what comes of it is below."""
-    asked = []
-
-    def analyse(measured, out, **options):
-        asked.append((measured, out, options))
-        raise tb.errors.InferenceError("that is enough")
-
-    monkeypatch.setattr("tactile_bayes.runs.contour.analyse", analyse)
-    assert_refused(call(*next_words), "that is enough")
-    ((measured, out, options),) = asked
-    expected = record_of_rig()
-    for name in ("drive_angle", *CHANNELS):
-        away = measured[name].values - expected[name].values
-        np.testing.assert_allclose(away, away[0], rtol=0.0, atol=4e-6)  # the zero that the inspection has found
-        assert abs(away[0]) < 5e-3
-    np.testing.assert_array_equal(measured.sweep.values, expected.sweep.values)
-    assert tb.record.rod_of(measured) == ROD
-    assert out == tmp_path / "run"
-    assert options["family"] == "parabola"
-    assert options["rig"].load_cell.force_noise == pytest.approx(LOAD_CELL.force_noise, rel=0.2)
-
-
 @pytest.mark.slow
-def test_a_laboratorys_path_ends_at_the_truth(next_words):
+def test_the_command_that_inspect_names_ends_at_the_truth(inspected, tmp_path):
     """At full length: each interval of 95 % holds the truth, up to half its width."""
-    answer = answered(*next_words)
+    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
+    answer = answered(*(str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)))
     assert answer["converged"] is True
     rows = {row["quantity"]: row for row in answer["quantities"]}
     for name, truth in {"a": 2.5, "q": 0.1, "x_c": 0.0, "friction": 0.0}.items():

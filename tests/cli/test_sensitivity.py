@@ -9,7 +9,6 @@ import xarray as xr
 
 import tactile_bayes as tb
 from helpers import commands
-from tactile_bayes.contours import Parabola
 from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.runs import sensitivity as sensitivity_run
 
@@ -122,17 +121,6 @@ def test_json_has_the_words_and_the_numbers(asked, analysed, tmp_path):
     assert [cell["noise_factor"] for cell in answer["study"]] == [0.3, 1.0]
     assert {cell["rms_across"] for cell in answer["study"]} == {0.01}
     assert {cell["expected_gap_width"] for cell in answer["study"]} == {None}
-
-
-def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
-    assert call("--out", tmp_path).exit_code == 0
-    options = asked["sensitivity"]
-    assert options["contour"] == Parabola(0.5, 0.5)
-    assert (options["rig"].rod, options["rig"].load_cell, options["rig"].entries) == (None, None, {})
-    assert options["rng"] == 1
-    assert options["drive"] == [tb.Rotation(drive_step=float(np.radians(1.0)))]
-    assert options["band_widths"] is None
-    assert not (tmp_path / "study").exists()
 
 
 def test_rig_and_options_arrive(asked, tmp_path, rig_file):

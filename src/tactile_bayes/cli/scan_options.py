@@ -48,7 +48,7 @@ class CarryOptions:
 
     def carried(self, step: float | None = None) -> list[Carried]:
         """Return translations along lines, and motions along paths, of a step [length]."""
-        return [_motion(Path(text), step) if _is_file(text) else _translation(text, step) for text in self.carry or []]
+        return [_carried(text, step) for text in self.carry or []]
 
 
 @dataclass(frozen=True)
@@ -86,24 +86,16 @@ def rotation_step(step: float | None) -> float | None:
     return None if step is None else math.radians(step)
 
 
-def _is_file(text: str) -> bool:
-    """Return True for the name of a file, which has no comma unless there is one of that name."""
-    return "," not in text or Path(text).is_file()
-
-
-def _translation(text: str, step: float | None) -> Carried:
-    from tactile_bayes.sweep import Translation
-
-    x, y, heading, angle, travel = numbers_asked(text, "--carry", 5)
-    return Translation((x, y), math.radians(heading), math.radians(angle), travel, step)
-
-
-def _motion(path: Path, step: float | None) -> Carried:
+def _carried(text: str, step: float | None) -> Carried:
+    """Return a motion along the poses of a file, whose name has no comma unless it is there, or a translation."""
     from tactile_bayes.record.points import columns_in
-    from tactile_bayes.sweep import Motion
+    from tactile_bayes.sweep import Motion, Translation
 
-    x, y, angles = columns_in(path, ("x", "y", "drive_angle"), "pose")
-    return Motion(x, y, [math.radians(angle) for angle in angles], step)
+    if "," not in text or Path(text).is_file():
+        x, y, angles = columns_in(Path(text), ("x", "y", "drive_angle"), "pose")
+        return Motion(x, y, [math.radians(angle) for angle in angles], step)
+    left, height, heading, angle, travel = numbers_asked(text, "--carry", 5)
+    return Translation((left, height), math.radians(heading), math.radians(angle), travel, step)
 
 
 @dataclass(frozen=True)

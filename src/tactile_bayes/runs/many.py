@@ -140,7 +140,9 @@ def infer_contours(
             if workers.progress is not None:
                 done = len(tasks) - len(left) + count
                 workers.progress(TaskProgress(done, len(tasks), count, time.monotonic() - began))
-    others = {name: row for name, row in _rows_in(folder, failed).items() if name not in rows}
+    complete = {path.parent.name: _stored(path.parent) for path in sorted(folder.glob(f"*/{ROW}"))}
+    others = {**failed, **{name: run["row"] for name, run in complete.items() if run is not None}}
+    others = {name: row for name, row in others.items() if name not in rows}
     table = _table({**others, **{name: rows[name] for name in names}})
     with Folder(folder, MANY) as written:
         written.write_netcdf("table", "runs.nc", table)
@@ -209,12 +211,6 @@ def _kept(task: _Task) -> dict[str, Any] | None:
         )
     row: dict[str, Any] = stored["row"]
     return row
-
-
-def _rows_in(folder: Path, failed: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
-    """Return the rows of the runs of a folder, and those of records that have failed and have no run since."""
-    found = {path.parent.name: _stored(path.parent) for path in sorted(folder.glob(f"*/{ROW}"))}
-    return {**failed, **{name: stored["row"] for name, stored in found.items() if stored is not None}}
 
 
 def _failures_in(folder: Path) -> dict[str, dict[str, Any]]:
