@@ -64,11 +64,9 @@ def figures(
             progress=lambda done: note(TaskProgress(done, count, done, 0.0)),
             **options,
         )
-    captions = {number: caption(number, **options) for number in files}
-    words = [
-        line
-        for number, of_formats in files.items()
-        for line in (f"Figure {number}: {captions[number]}", *(f"    {path}" for path in of_formats.values()))
-    ]
-    rows = [{"number": number, "caption": captions[number], "files": files[number]} for number in files]
+    words, rows = list[str](), list[dict[str, Any]]()
+    for number, of_formats in files.items():
+        text = caption(number, **options)
+        words += [f"Figure {number}: {text}", *(f"    {path}" for path in of_formats.values())]
+        rows.append({"number": number, "caption": text, "files": of_formats})
     return Answer(words, lambda: {"figures": rows})

@@ -65,21 +65,10 @@ def measure(
         write_record(measured, out)
     truth = "with the columns of the truth" if keep_truth else "without columns of the truth"
     samples, files = measured.sizes["sample"], {"record": out}
+    words = f"{samples} samples, {truth}; the load cell, which the file states:"
+    numbers = {"samples": samples, "units": measured.attrs["units"], "seed": seed, "truth": keep_truth, "files": files}
     return Answer(
-        [
-            f"{samples} samples, {truth}; the load cell, which the file states:",
-            *_sheet(cell.entries(), measured),
-            "",
-            files,
-        ],
-        lambda: {
-            "samples": samples,
-            "units": measured.attrs["units"],
-            "seed": seed,
-            "load_cell": cell.entries(),
-            "truth": keep_truth,
-            "files": files,
-        },
+        [words, *_sheet(cell.entries(), measured), "", files], lambda: {**numbers, "load_cell": cell.entries()}
     )
 
 
