@@ -12,8 +12,6 @@ from tactile_bayes import datasets
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.report import write_report
 from tactile_bayes.runs.contour import analyse
-from tactile_bayes.runs.trust import trust_into
-from tactile_bayes.runs.watch import Watch
 
 TEXT = "the only copy of a day's work"
 
@@ -121,13 +119,10 @@ def test_functions_that_know_both_refuse_as_well(tmp_path, measured):
     run.mkdir()
     for path in (run / "posterior.nc", run / "contacts.csv", spec):
         path.write_text(TEXT)
-    os.link(run / "posterior.nc", tmp_path / "trust.nc")
     before = contents(tmp_path)
     for call in (
         lambda: write_report(run, run / "posterior.nc"),
-        lambda: trust_into(run, tmp_path),
         lambda: datasets.generate(spec, tmp_path),
-        lambda: Watch(run, record_file=run / "contacts.csv"),
         lambda: analyse(measured, run, record_file=run / "contacts.csv", rng=1),
     ):
         with refused(ParameterError, "would replace"):

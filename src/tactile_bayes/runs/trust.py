@@ -12,7 +12,6 @@ from tactile_bayes import plotting
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.runs.folder import Folder, Run, posterior_in
 from tactile_bayes.runs.names import TRUST
-from tactile_bayes.tasks import refuse_replacing
 
 REPLICATES_FOLDER = "trust"  # subfolder of the replicates, from which a stopped run resumes
 
@@ -23,7 +22,6 @@ def trust_into(
     """Judge the posterior of a run, and write the result."""
     path = posterior_in(Path(run))
     place = path.parent if out is None else Path(out)
-    refuse_replacing((place / name for name in TRUST), [path])
     found = trust(path, out=place / REPLICATES_FOLDER, **options)
     with Folder(place, TRUST) as folder:
         folder.write_netcdf("trust", "trust.nc", found)

@@ -24,8 +24,7 @@ from tactile_bayes.record import record_hash
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import memory_in, sensor_values
 from tactile_bayes.runs.contour import ContourRun, RunFolder, complete, file_of, origin_of
-from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
-from tactile_bayes.tasks import alone_in, refuse_replacing
+from tactile_bayes.tasks import alone_in
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.rod_reach import reach
 from tactile_bayes.uncertainty.summary import summary
@@ -101,8 +100,6 @@ class Watch:
                 raise ParameterError("until_probability is for several families: give two or more")
         self._most = check_whole_number("most_samples", most_samples, 100, "give a whole number of at least 100")
         self._until_width, self._until_probability = until_width, until_probability
-        written = (*INFERENCE, *OF_POSTERIOR, *WATCH)
-        refuse_replacing((Path(out) / name for name in written), [Path(record_file)])
         self._file, self._command = record_file, command
         self._rig = rig_of(rig)
         self._options = {**options, "rig": self._rig}
