@@ -9,7 +9,6 @@ from math import inf
 from typing import TYPE_CHECKING, Annotated
 
 from tactile_bayes.cli.interrupts import resumable
-from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -36,13 +35,8 @@ class WorkerOptions:
         """Return the workers, of which a function hears."""
         from tactile_bayes.tasks import Workers
 
-        if self.workers is None or "://" in self.workers:
-            return Workers(self.workers, progress)
-        if not (self.workers.isascii() and self.workers.isdigit() and int(self.workers)):
-            raise ParameterError(
-                f"--workers is {self.workers!r}: give a number of processes, or the address of a scheduler"
-            )
-        return Workers(int(self.workers), progress)
+        where = self.workers
+        return Workers(int(where) if where is not None and where.isdecimal() else where, progress)
 
 
 @contextmanager

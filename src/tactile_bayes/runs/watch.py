@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -29,7 +28,6 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.rod_reach import reach
 from tactile_bayes.uncertainty.summary import summary
 
-_STATE = "stream.nc"  # file of the stream in a folder, from which a watch resumes
 _POINTS = 201  # number of grid points of the band
 
 
@@ -111,14 +109,10 @@ class Watch:
             self._options["families"] = list(families)
         self._kind(**self._options)  # which refuses what it can before the first sample
         self.folder = RunFolder(out)
+        self.state = self.folder.path / "stream.nc"  # from which a watch resumes
         self._stream: Stream | StreamComparison | None = None
         self._every = 1
         self._answer: tuple[xr.DataTree, xr.Dataset] | None = None
-
-    @property
-    def state(self) -> Path:
-        """File of the stream."""
-        return self.folder.path / _STATE
 
     @property
     def samples(self) -> int:
@@ -133,7 +127,8 @@ class Watch:
             return None
         stored = self._kind.resume(self.state, **self._options)
         strides = [1 << power for power in range(record.sizes["sample"].bit_length())]
-        every = next((stride for stride in strides if _continues(stored.record, _thinned(record, stride))), None)
+        thinned = ((stride, record.isel(sample=slice(None, None, stride))) for stride in strides)
+        every = next((stride for stride, some in thinned if _continues(stored.record, some)), None)
         if every is None:  # it is of another record, and the message states what differs
             stored = self._kind.resume(self.state, record, **self._options)
         self._stream, self._every = stored, every or 1
@@ -147,7 +142,7 @@ class Watch:
         """Take the samples that are new into account, and write the stream and its posterior."""
         began, had = perf_counter(), self.samples
         every = self._stride(record)
-        record = _thinned(record, every)
+        record = record.isel(sample=slice(None, None, every))
         if self._stream is not None and every == self._every and _continues(self._stream.record, record):
             if had == record.sizes["sample"]:
                 return None
@@ -223,11 +218,6 @@ class Watch:
             if probabilities[family] > self._until_probability:
                 return f"{family} is probable enough"
         return ""
-
-
-def _thinned(record: xr.Dataset, every: int) -> xr.Dataset:
-    """Return every so many samples of a record, from the first on."""
-    return record.isel(sample=slice(None, None, every))
 
 
 def _continues(before: xr.Dataset | None, record: xr.Dataset) -> bool:
