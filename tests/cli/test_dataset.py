@@ -145,10 +145,7 @@ def test_what_was_made_is_said_in_three_lines_and_not_made_again(small):
         ("generate {spec} --out {new}", ("[scan]", "[scan"), ["small.toml: not TOML"]),
         ("generate {spec} --out {set}", ("seed = 1", "seed = 2"), ["set", "another specification"]),
         ("generate {new}/nowhere.toml --out {new}", None, ["nowhere.toml: No such file or directory"]),
-        *(
-            (f"generate {{spec}} --out {{new}} --workers {few}", None, ["workers is ", few])
-            for few in ("many", "0", "-1")
-        ),
+        *((f"generate {{spec}} --out {{new}} --workers {few}", None, ["workers", few]) for few in ("many", "0", "-1")),
         ("verify {folder}", None, ["holds no data set", "manifest.json"]),
         ("record {set} 6 --out {new}/record.csv", None, ["no record 6", "0 to 5"]),
         ("record {set} 0 --out {new}/record.txt", None, ["record.txt", ".csv", ".nc"]),
