@@ -183,23 +183,19 @@ def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, flo
     rows = columns_of(run.summary, "quantity")
     if truth:
         rows = [{**row, "truth": truth.get(str(row["quantity"]))} for row in rows]
-    answer: dict[str, Any] = {
+    contacts = run.contacts
+    checks = ("misfit_probability", "axial_score")
+    return {
         "words": run.messages,
         "converged": bool(attrs["converged"]),
-        "message": attrs["message"],
-        "family": attrs["family"],
+        **{name: attrs[name] for name in ("message", "family")},
         "probability": run.summary.attrs["probability"],
         "quantities": rows,
-        "samples": None,
-        "misfit_probability": None,
-        "axial_score": None,
+        "samples": None if contacts is None else dict(Counter(contacts.status.values.tolist()).most_common()),
+        **{name: None if contacts is None else contacts.attrs.get(name) for name in checks},
         "files": files,
         "left_out": {what: str(error) for what, error in run.left_out.items()},
     }
-    if run.contacts is not None:
-        answer["samples"] = dict(Counter(run.contacts.status.values.tolist()).most_common())
-        answer |= {name: run.contacts.attrs.get(name) for name in ("misfit_probability", "axial_score")}
-    return answer
 
 
 def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> Iterator[Any]:

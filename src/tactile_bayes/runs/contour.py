@@ -205,19 +205,11 @@ def _completed(
         numbers = summary(result, probability, edges)
         found = () if checked is None else checked.messages
 
-        def write_summary() -> None:
-            table = numbers.to_dataframe().to_string()
-            lines = (*found, *folder.messages, "", table, "", result.attrs["message"])
-            folder.write_lines("messages", "summary.txt", lines)
-            folder.write_table("summary", "summary.csv", numbers)
-
-        write_summary()
-        before = len(folder.left_out)
+        folder.write_summary((*found, *folder.messages), numbers, result.attrs["message"])
         if figures:
             follow("figures")
             _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
-        if len(folder.left_out) > before:
-            write_summary()
+            folder.write_summary((*found, *folder.messages), numbers, result.attrs["message"])  # with what failed now
         said = (*found, *folder.messages)
         return ContourRun(result, contacts, band, numbers, checked, said, folder.files, folder.left_out)
 

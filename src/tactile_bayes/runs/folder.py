@@ -71,6 +71,12 @@ class Folder:
         with self.file(what, name) as temporary:
             table.to_dataframe().to_csv(temporary)
 
+    def write_summary(self, messages: Iterable[str], numbers: xr.Dataset, message: str) -> None:
+        """Write a summary of a posterior: beside messages and that of its sampling, and alone as CSV."""
+        lines = (*messages, "", numbers.to_dataframe().to_string(), "", message)
+        self.write_lines("messages", "summary.txt", lines)
+        self.write_table("summary", "summary.csv", numbers)
+
     def write_netcdf(self, what: str, name: str, content: xr.Dataset | xr.DataTree) -> None:
         """Write a dataset or a tree as NetCDF, with checksums."""
         with self.file(what, name) as temporary:

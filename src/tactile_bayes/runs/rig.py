@@ -56,7 +56,5 @@ def calibrate_rig_into(
         with folder.file("rig", "rig.toml") as temporary:
             rig.write(temporary)
         folder.write_netcdf("posterior", "rig.nc", found)
-        table = numbers.to_dataframe().to_string()
-        folder.write_lines("messages", "summary.txt", (*messages, "", table, "", found.attrs["message"]))
-        folder.write_table("summary", "summary.csv", numbers)
+        folder.write_summary(messages, numbers, found.attrs["message"])
     return RigRun(rig, folder.files, numbers, tuple(messages))
