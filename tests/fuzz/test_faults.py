@@ -148,6 +148,12 @@ def write_report(folder, k):
     writing.write_report(run)
 
 
+def write_run(folder, k):
+    run = contour.RunFolder(folder)
+    run.write_posterior(tree(k))
+    contour.complete(run, record(k), Rig(), tree(k), 0.95)
+
+
 WRITERS = {
     "record.csv": lambda folder, k: write_record(record(k), folder / "record.csv"),
     "record.nc": lambda folder, k: write_record(record(k), folder / "record.nc"),
@@ -157,7 +163,7 @@ WRITERS = {
     "outcomes": write_outcomes,
     "checkpoint": write_states,
     "data set": lambda folder, k: datasets.generate(SPEC, folder, workers=1) if k else None,
-    "infer": lambda folder, k: contour.complete(tree(k), record(k), folder),
+    "infer": write_run,
     "inspect": lambda folder, k: inspection.write_inspection(INSPECTIONS[k], folder, rig=Rig()),
     "compare": lambda folder, k: comparison.write_comparison(data(k), folder),
     "calibrate-rig": lambda folder, k: rig.calibrate_rig_into(

@@ -165,9 +165,10 @@ def test_a_run_that_writes_less_leaves_nothing_of_the_former_one(analysed, measu
     (tmp_path / "trust").mkdir()
     for name in (*former, "notes.txt", "comparison.nc"):
         (tmp_path / name).write_text("former", encoding="utf-8")
-    RunFolder(tmp_path).write_posterior(run.posterior)  # which removes all that belongs to another one at once
+    folder = RunFolder(tmp_path)
+    folder.write_posterior(run.posterior)  # which removes all that belongs to another one at once
     assert {path.name for path in tmp_path.iterdir()} == {"posterior.nc", "notes.txt", "comparison.nc", "trust"}
-    complete(run.posterior, without(measured, "force_x"), tmp_path)
+    complete(folder, without(measured, "force_x"), Rig(), run.posterior, 0.95)
     left = {path.name for path in tmp_path.rglob("*")} - {"notes.txt", "comparison.nc", "trust"}
     assert left == {"summary.txt", "posterior.nc", "band.csv", "summary.csv"}
     assert all((tmp_path / name).read_bytes() != b"former" for name in left)

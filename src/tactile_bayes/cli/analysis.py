@@ -26,16 +26,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.runs.contour import ContourRun
 
-Family = Annotated[
-    str,
-    "Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, any "
-    "smooth one.",
-]
-
-Records = Annotated[
-    list[Path], "Record, .csv or .nc, or a bag of ROS; or several, or a folder of them.", typer.Argument()
-]
-
 # Quantities in the table of several records; the file has all.
 _SHOWN = ("a", "b", "r", "n", "w", "q", "x_c", "gap width")
 _STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again leaves a part out)"
@@ -44,9 +34,15 @@ _STOPPING = "stopping; the draws made so far are checked, plotted and written no
 def infer(
     *,
     ctx: typer.Context,
-    record: Records,
+    record: Annotated[
+        list[Path], "Record, .csv or .nc, or a bag of ROS; or several, or a folder of them.", typer.Argument()
+    ],
     out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, WATCH_PAGE, *MANY))],
-    family: Family = "parabola",
+    family: Annotated[
+        str,
+        "Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, any "
+        "smooth one.",
+    ] = "parabola",
     rig: RigOptions,
     probability: Annotated[float, "Probability of band and intervals.", typer.Option(min=0.0, max=1.0)] = 0.95,
     max_seconds: Annotated[

@@ -24,8 +24,6 @@ dataset = typer.Typer(
     rich_markup_mode=None,
 )
 
-Folder = Annotated[Path, "Folder of the data set.", typer.Argument()]
-
 
 @dataset.command(epilog="Example: tactile-bayes dataset example > set.toml")
 def example() -> None:
@@ -73,7 +71,7 @@ def generate(
 @as_command
 def verify(
     *,
-    folder: Folder,
+    folder: Annotated[Path, "Folder of the data set.", typer.Argument()],
     regenerate: Annotated[int, "Files to be made again, and compared number by number.", typer.Option(min=0)] = 0,
     output: Output,
 ) -> Answer:

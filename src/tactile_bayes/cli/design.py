@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from tactile_bayes.runs.folder import Run
     from tactile_bayes.sweep import Carried, Drive
 
-Criterion = Literal["band", "gap", "information"]
-
 
 def design(
     *,
@@ -41,7 +39,9 @@ def design(
         "heights.",
     ] = None,
     drive_step: Annotated[list[float] | None, "A step of the drive to choose from [degrees]; by default 2."] = None,
-    criterion: Annotated[Criterion, "The narrowest band, the smallest gap, or the most information."] = "band",
+    criterion: Annotated[
+        Literal["band", "gap", "information"], "The narrowest band, the smallest gap, or the most information."
+    ] = "band",
     nested: Annotated[
         bool, "Sample each candidate's posteriors as well, which takes longer; the same command resumes a stopped run."
     ] = False,

@@ -152,24 +152,10 @@ def analyse(
         if not drawn:
             raise
         folder.left_out["predictions"] = error
-    return _completed(folder, measured, rig, drawn[-1], probability, truth, figures, follow)
+    return complete(folder, measured, rig, drawn[-1], probability, truth, figures, follow)
 
 
 def complete(
-    posterior: xr.DataTree,
-    measured: xr.Dataset,
-    out: str | os.PathLike[str],
-    *,
-    rig: Rig | None = None,
-    probability: float = 0.95,
-) -> ContourRun:
-    """Write a posterior, and what `analyse` writes beside it, to a folder; arguments and result are as there."""
-    folder = RunFolder(out)
-    folder.write_posterior(posterior)
-    return _completed(folder, measured, rig_of(rig), posterior, probability)
-
-
-def _completed(
     folder: RunFolder,
     measured: xr.Dataset,
     rig: Rig,

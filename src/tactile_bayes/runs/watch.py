@@ -162,7 +162,7 @@ class Watch:
         if self._answer is None:
             raise InferenceError("there is no answer yet: no samples have been taken into account")
         posterior, record = self._answer
-        return complete(posterior, record, self.folder.path, rig=self._rig, probability=self._probability)
+        return complete(self.folder, record, self._rig, posterior, self._probability)
 
     def _update(
         self, stream: Stream | StreamComparison, had: int, began: float, sha256: str, *, restarted: bool = False
