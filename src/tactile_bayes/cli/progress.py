@@ -80,7 +80,7 @@ def step_bar(quiet: bool, noun: str = "step", at_first: str = "beginning") -> It
 
         def show(done: int, count: int) -> None:
             if move is not None:
-                move(total=count, completed=done, description=f"{done:,} of {counted(count, noun)}")
+                move(total=count, completed=done, description=f"{done:,} of {counted(count, noun)}", left="left")
 
         yield show
 
@@ -95,9 +95,10 @@ def moving_bar(quiet: bool, at_first: str) -> Iterator[Callable[..., object] | N
     if quiet or not console.is_terminal:
         yield None
         return
-    columns = (SpinnerColumn("line"), BarColumn(12), TextColumn("{task.description}"), TimeRemainingColumn(), "left")
+    words, left = TextColumn("{task.description}"), TextColumn("{task.fields[left]}")
+    columns = (SpinnerColumn("line"), BarColumn(12), words, TimeRemainingColumn(), left)
     with Progress(*columns, console=console, transient=True) as bar:
-        yield partial(bar.update, bar.add_task(at_first, total=None))
+        yield partial(bar.update, bar.add_task(at_first, total=None, left=""))
 
 
 def counted(count: int, noun: str) -> str:
@@ -120,11 +121,11 @@ class SamplingBar:
         time = progress.seconds / (self.max_seconds or inf)
         shares = (progress.ess / _GOAL, progress.steps / progress.max_steps, time)
         done = max(share for share in shares if share == share)  # NaN without effective draws
-        self.move(total=1.0, completed=min(done, 1.0), description=f"{what}, {words}" if what else words)
+        self.move(total=1.0, completed=min(done, 1.0), description=f"{what}, {words}" if what else words, left="left")
 
     def follow(self, what: str) -> None:
         """Show what is done now."""
-        self.move(total=None, description=what)
+        self.move(total=None, description=what, left="")
 
 
 @contextmanager
