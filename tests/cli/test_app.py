@@ -15,6 +15,7 @@ from helpers.interrupts import interrupted_while_sampling
 from helpers.report_pages import FEW
 from tactile_bayes import __version__, read_record
 from tactile_bayes.cli import app
+from tactile_bayes.cli.numbers import as_typed
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -283,3 +284,12 @@ def test_settings_of_matplotlib_in_the_folder_do_not_end_a_command(record, tmp_p
     _, errors = start("inspect", record, "--out", "inspection", "--quiet", cwd=tmp_path)
     assert errors == ""
     assert (tmp_path / "inspection" / "inspection.png").exists()
+
+
+def test_dashes_that_programs_for_texts_make_are_read_as_typed():
+    assert call("\N{EM DASH}version").stdout == call("--version").stdout
+    assert list(map(as_typed, ["\N{EN DASH}q", "\N{MINUS SIGN}0.5,2", "a\N{EN DASH}b"])) == [
+        "-q",
+        "-0.5,2",
+        "a\N{EN DASH}b",
+    ]

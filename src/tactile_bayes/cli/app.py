@@ -23,6 +23,7 @@ from tactile_bayes.cli.design import design
 from tactile_bayes.cli.figures import figures
 from tactile_bayes.cli.inspection import inspect
 from tactile_bayes.cli.measurement import measure
+from tactile_bayes.cli.numbers import as_typed
 from tactile_bayes.cli.reconstruction import reconstruct
 from tactile_bayes.cli.report import report
 from tactile_bayes.cli.rig_calibration import calibrate_rig
@@ -40,6 +41,7 @@ class _Commands(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Store the arguments of the call, which a posterior states."""
+        args = list(map(as_typed, args))
         ctx.meta["words"] = ("tactile-bayes", *args)
         return super().parse_args(ctx, args)
 

@@ -21,6 +21,23 @@ def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
     return numbers
 
 
+def as_typed(word: str) -> str:
+    """Return a word of a command line as it would be typed: dashes of options, and numbers, in plain characters.
+
+    Programs for texts turn -- into a dash, and a hyphen before a digit into a minus sign.
+    """
+    if word.isascii():
+        return word
+    from tactile_bayes.record.cell import number_in
+    from tactile_bayes.record.spelling import plain, plain_number
+
+    option = word.lstrip("-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}")
+    if option != word and not word.startswith("-") and option[:1].isalpha():
+        return f"{'-' if len(option) == 1 else '--'}{option}"
+    numbers = plain(plain_number(word))
+    return numbers if all(part and number_in(part) is not None for part in numbers.split(",")) else word
+
+
 def assigned(
     option: str, texts: Sequence[str] | None, form: str = "", *, known: Collection[str] = ()
 ) -> dict[str, str]:
