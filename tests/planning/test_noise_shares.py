@@ -126,14 +126,7 @@ def test_places_are_evenly_within_the_sweeps():
     assert np.any(other.values != found.share.values)
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        *({"samples": samples} for samples in (1000, 1, 0, -4, 64.0, True, "64")),
-        *({"states": states} for states in (1, 0, 2.0, True)),
-    ],
-    ids=str,
-)
-def test_samples_that_are_no_power_of_two_and_too_few_states_are_refused(wrong):
-    with refused(ParameterError, **wrong):
-        noise_shares(QUIET, rng=1, **({"samples": 16} | wrong))
+@pytest.mark.parametrize("samples", [1000, 1, 0, -4, 64.0, True, "64"])
+def test_samples_that_are_no_power_of_two_are_refused(samples):
+    with refused(ParameterError, samples=samples):
+        noise_shares(QUIET, rng=1, samples=samples)

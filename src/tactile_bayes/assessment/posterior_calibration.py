@@ -186,9 +186,7 @@ def _made(experiment: PosteriorExperiment, number: int) -> Outcome:
     angles = record.drive_angle.values - experiment.experiment.noise.cell.misread(record.direction.values)
     numbers = dict(outcome.numbers)
     exact = experiment.exact_model.likelihood
-    numbers |= contact_coverage(
-        joint, result.draws.samples, simulation, exact, angles, angles, experiment.probability, rng
-    )
+    numbers |= contact_coverage(joint, result, simulation, exact, angles, angles, experiment.probability, rng)
     return outcome._replace(numbers=numbers | _ratios(result.tree, simulation, experiment.probability))
 
 
@@ -246,7 +244,7 @@ def _summary(task: PosteriorExperiment, outcomes: Mapping[int, Outcome]) -> xr.D
         k: row._replace(numbers={name: v for name, v in row.numbers.items() if not name.startswith(_RATIO)})
         for k, row in outcomes.items()
     }
-    found = summary(task, plain)
+    found = summary(task.identity, task.probability, plain)
     regions, factors, needed = ("in_gap", "beside"), [], []
     for region in regions:
         start = f"{_RATIO}_{region}_"

@@ -144,7 +144,7 @@ def calibrate(
     experiment = experiment_of(family, rig, rng=rng, drive=drive, settings=settings, truth=truth)
     with open_results_store(experiment.identity, out, REPLICATES) as store:
         kept = keep_outcomes(store, replicate, experiment, int(replicates), workers=workers)
-    return summary(experiment, kept)
+    return summary(experiment.identity, experiment.probability, kept)
 
 
 def calibration_replicate(

@@ -35,9 +35,8 @@ def uniformity_p_value(ranks: ArrayLike, top: int) -> float:
 
     Shapes: ranks (n,).
     """
-    counts = np.bincount(np.asarray(ranks, dtype=np.intp), minlength=top + 1)
-    least = _least_probability(np.cumsum(counts)[None, :-1], int(counts.sum()))[0]
-    null = _null(int(counts.sum()), top)
+    below = np.cumsum(np.bincount(np.asarray(ranks, dtype=np.intp), minlength=top + 1))
+    least, null = _least_probability(below[:-1], int(below[-1])), _null(int(below[-1]), top)
     return float((1 + np.searchsorted(null, least, side="right")) / (1 + null.size))
 
 
@@ -132,9 +131,9 @@ def _tails(count: int, top: int) -> Floats:
 
 
 def _least_probability(below: Index, count: int) -> Floats:
-    """Return twice the least tail over all ranks, shape (rows,), from numbers of ranks, shape (rows, top)."""
-    top = below.shape[1]
-    return np.asarray(_tails(count, top)[below, np.arange(top)].min(axis=1))
+    """Return twice the least tail over all ranks, shape (...), from numbers of ranks, shape (..., top)."""
+    top = below.shape[-1]
+    return np.asarray(_tails(count, top)[below, np.arange(top)].min(axis=-1))
 
 
 @lru_cache(maxsize=8)

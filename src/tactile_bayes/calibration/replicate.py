@@ -6,12 +6,13 @@ import math
 import time
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.diagnostics.predictive_check import predictive_check
@@ -78,27 +79,13 @@ def walkers_of(parameters: int) -> int:
 
 
 class Replicate(NamedTuple):
-    """One replicate with its intermediate results, as far as they were computed.
+    """One replicate with its intermediate results, as far as they were computed."""
 
-    Attributes
-    ----------
-    number : int
-        Number of the replicate, from 0 up.
-    outcome : Outcome
-        Entries of the results store: ``ranks``, ``numbers``, ``message`` and ``traceback``.
-    truth : mapping of str to float
-        Parameters that were drawn, by name, in the record's units; empty if none were.
-    measured : xr.Dataset, optional
-        The record.
-    posterior : xr.DataTree, optional
-        The posterior of the record.
-    """
-
-    number: int
-    outcome: Outcome
-    truth: Mapping[str, float]
-    measured: xr.Dataset | None
-    posterior: xr.DataTree | None
+    number: int  # number of the replicate, from 0 up
+    outcome: Outcome  # entries of the results store: ranks, numbers, message and traceback
+    truth: Mapping[str, float]  # parameters that were drawn, by name, in the record's units; empty if none were
+    measured: xr.Dataset | None  # the record
+    posterior: xr.DataTree | None  # its posterior
 
 
 def replicate(task: tuple[SimulatedExperiment, int]) -> Outcome:
@@ -143,18 +130,15 @@ def _compared(
     rng: np.random.Generator,
 ) -> Outcome:
     """Compare a posterior with the truth."""
-    likelihood, assumed = experiment.model.likelihood, experiment.assumed
-    direction = assumed.record.direction.values
-    outcome = compared(model, result, simulation, experiment.probability, rng, is_of_family=experiment.is_of_family)
+    assumed, probability = experiment.assumed, experiment.probability
+    outcome = compared(model, result, simulation, probability, rng, is_of_family=experiment.is_of_family)
     numbers = dict(outcome.numbers)
     if assumed.events:  # without events, inference uses fewer samples
+        direction, exact = assumed.record.direction.values, experiment.model.likelihood
         true_angles = assumed.record.drive_angle.values - experiment.simulated.noise.cell.misread(direction)
         angles = simulation.measured.drive_angle.values - assumed.noise.cell.misread(direction)
-        numbers |= contact_coverage(
-            model, result.draws.samples, simulation, likelihood, true_angles, angles, experiment.probability, rng
-        )
-    numbers |= _checks(result.tree, simulation, experiment)
-    return outcome._replace(numbers=numbers)
+        numbers |= contact_coverage(model, result, simulation, exact, true_angles, angles, probability, rng)
+    return outcome._replace(numbers=numbers | _checks(result.tree, simulation, experiment))
 
 
 def compared(
@@ -173,7 +157,7 @@ def compared(
         "effective_draws": float(np.min([draws.ess_bulk, draws.ess_tail])),
         "evaluations": float(draws.evaluations),
     }
-    ranks = _ranks(model, draws.samples, simulation.truth, is_of_family, rng)
+    ranks = _ranks(model, result, simulation.truth, is_of_family, rng)
     ranks |= _ranks_of_events(result.tree, simulation, rng)
     numbers |= _bands(result.tree, simulation, probability)
     numbers |= _snap_offs(result.tree, simulation, probability)
@@ -181,7 +165,7 @@ def compared(
 
 
 def _ranks(
-    model: ContourModel, samples: Floats, truth: Mapping[str, float], is_of_family: bool, rng: np.random.Generator
+    model: ContourModel, result: Sampled, truth: Mapping[str, float], is_of_family: bool, rng: np.random.Generator
 ) -> dict[str, int]:
     """Rank the true parameters and their log-likelihood among the draws.
 
@@ -189,8 +173,7 @@ def _ranks(
     family has no true parameters. What has no true value has no rank, nor has one at an end of its prior, beyond which
     there are no draws.
     """
-    draws = samples.reshape(-1, samples.shape[-1])
-    picked = draws[rng.choice(len(draws), min(DRAWS, len(draws)), replace=False)]
+    picked = _picked(_points(result), DRAWS, rng)
     first = 0 if is_of_family else len(model.family.parameters)
     point = np.array([truth.get(name, np.nan) for name in model.names])
     ends = model.ends
@@ -205,14 +188,19 @@ def _ranks(
 def _ranks_of_events(tree: xr.DataTree, simulation: Simulation, rng: np.random.Generator) -> dict[str, int]:
     """Rank the true drive angle of snap-off in each sweep segment among the draws."""
     events = tree["events"].to_dataset()
-    angles = _travels(events).stack(all=("chain", "draw")).values  # (segments, draws)
-    picked = rng.choice(angles.shape[1], min(DRAWS, angles.shape[1]), replace=False)
-    names = _segment_names(events)
-    truths = _travels(simulation.events)
-    return {
-        f"snap_off_{name}": _rank(of_segment[picked], truth, rng)
-        for name, of_segment, truth in zip(names, angles, truths, strict=True)
-    }
+    angles = _picked(_travels(events).stack(all=("chain", "draw")).values.T, DRAWS, rng)  # (draws, segments)
+    of_segments = zip(_segment_names(events), angles.T, _travels(simulation.events), strict=True)
+    return {f"snap_off_{name}": _rank(draws, truth, rng) for name, draws, truth in of_segments}
+
+
+def _points(result: Sampled) -> Floats:
+    """Return the draws of all walkers, shape (n, d)."""
+    return result.draws.samples.reshape(-1, result.draws.samples.shape[-1])
+
+
+def _picked(draws: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """Return draws picked at random, all of them if they are fewer."""
+    return draws[rng.choice(len(draws), min(count, len(draws)), replace=False)]
 
 
 def _travels(events: Any) -> Any:
@@ -223,12 +211,10 @@ def _travels(events: Any) -> Any:
 def _segment_names(events: xr.Dataset) -> list[str]:
     """Return a distinct name for each sweep segment: its direction, with a number if there are several."""
     directions = [str(direction) for direction in events.segment.values]
-    counted = dict.fromkeys(directions, 0)
-    names = []
-    for direction in directions:
-        counted[direction] += 1
-        names.append(direction if directions.count(direction) == 1 else f"{direction}_{counted[direction]}")
-    return names
+    return [
+        direction if directions.count(direction) == 1 else f"{direction}_{directions[: k + 1].count(direction)}"
+        for k, direction in enumerate(directions)
+    ]
 
 
 def _rank(draws: Floats, truth: float, rng: np.random.Generator) -> int:
@@ -246,23 +232,23 @@ def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dic
     numbers: dict[str, float] = {}
     for region, x in grid_points_of(simulation).items():
         height = np.asarray(simulation.contour.height(x))
-        if not x.size:
-            continue
-        for simultaneous in (False, True):
-            band = contour_band(tree, x, probability, simultaneous)
-            inside = (band.lower.values <= height) & (height <= band.upper.values)
-            known = np.isfinite(band.lower.values)
-            if simultaneous:
-                numbers[f"simultaneous_{region}"] = float(inside.all()) if known.all() else np.nan
-                continue
-            off = band["median"].values - height
-            numbers |= {
-                f"pointwise_{region}": float(inside[known].mean()) if known.any() else np.nan,
-                f"width_{region}": float(np.mean(band.upper.values - band.lower.values)),
-                f"bias_{region}": float(np.mean(off)),
-                f"off_{region}": float(np.max(np.abs(off))),
-            }
+        band, whole = (contour_band(tree, x, probability, simultaneous) for simultaneous in (False, True))
+        (inside, known), (all_inside, all_known) = (_inside(each, height) for each in (band, whole))
+        off = band["median"].values - height
+        numbers |= {
+            f"pointwise_{region}": float(inside[known].mean()) if known.any() else np.nan,
+            f"width_{region}": float(np.mean(band.upper.values - band.lower.values)),
+            f"bias_{region}": float(np.mean(off)),
+            f"off_{region}": float(np.max(np.abs(off))),
+            f"simultaneous_{region}": float(all_inside.all()) if all_known.all() else np.nan,
+        }
     return numbers
+
+
+def _inside(band: xr.Dataset, height: Floats) -> tuple[Flags, Flags]:
+    """Return where a band contains heights, and where it is known."""
+    inside = (band.lower.values <= height) & (height <= band.upper.values)
+    return inside, np.isfinite(band.lower.values)
 
 
 def grid_points_of(simulation: Simulation) -> dict[str, Floats]:
@@ -291,7 +277,7 @@ def _snap_offs(tree: xr.DataTree, simulation: Simulation, probability: float) ->
 
 def contact_coverage(
     model: ContourModel,
-    samples: Floats,
+    result: Sampled,
     simulation: Simulation,
     likelihood: RecordLikelihood,
     true_angles: Floats,
@@ -308,8 +294,7 @@ def contact_coverage(
             chosen += [int(in_contact[round(share * (in_contact.size - 1))]) for share in _CONTACTS]
     if not chosen:
         return {}
-    draws = samples.reshape(-1, samples.shape[-1])
-    points = draws[rng.choice(len(draws), min(_CONTACT_DRAWS, len(draws)), replace=False)]
+    points = _picked(_points(result), _CONTACT_DRAWS, rng)
     asked = np.full(angles.size, np.nan)
     asked[chosen] = angles[chosen]
     found = contacts_of(model.likelihood, model.contours(points), model.rig(points), asked, exact=False)
@@ -329,19 +314,17 @@ def contact_coverage(
 
 def _checks(tree: xr.DataTree, simulation: Simulation, experiment: SimulatedExperiment) -> dict[str, float]:
     """Apply the checks that users see: of the posterior's predictions, and of the loads of single samples."""
-    numbers = {"check_p_value": np.nan, "check_passed": np.nan, "misfit_probability": np.nan, "axial_score": np.nan}
-    try:
+    of_samples = ("misfit_probability", "axial_score")
+    numbers = dict.fromkeys(("check_p_value", "check_passed", *of_samples), np.nan)
+    with suppress(InferenceError):  # a run that was cut short has too few predictions
         check = predictive_check(tree)
         if not check.attrs["not_checked"]:
             numbers |= {"check_p_value": float(check.overall_p_value), "check_passed": float(check.attrs["passed"])}
-    except InferenceError:  # a run that was cut short has too few predictions
-        pass
     if experiment.is_as_assumed:  # nothing to detect; this saves a tenth of the time
         return numbers
-    try:
+    contacts = None
+    with suppress(TactileBayesError):  # a channel without noise
         contacts = contact_points(simulation.measured, tree, experiment.assumed.noise.cell)
-    except TactileBayesError:  # a channel without noise
-        return numbers
     if contacts is None:
         return numbers
-    return numbers | {name: float(contacts.attrs[name]) for name in ("misfit_probability", "axial_score")}
+    return numbers | {name: float(contacts.attrs[name]) for name in of_samples}

@@ -101,14 +101,13 @@ class SimulatedExperiment:
         entries = {
             **self.assumed.assumptions,
             "drives": json.dumps([drive.description for drive in self.drives]),
-            "settings": json.dumps(asdict(self.settings), default=_plain),
-            "again": "never" if self.again is None else json.dumps(asdict(self.again), default=_plain),
+            "settings": _in_words(self.settings),
+            "again": "never" if self.again is None else _in_words(self.again),
             "probability": repr(self.probability),
             "seed": seed_words(self.seed),
         }
         return entries | self._differences | {f"version of {name}": version(name) for name in _LIBRARIES}
 
 
-def _plain(value: Any) -> Any:
-    """Convert a NumPy number to a Python number."""
-    return value.item()
+def _in_words(settings: SamplerSettings) -> str:
+    return json.dumps(asdict(settings), default=lambda number: number.item())  # NumPy numbers as Python's

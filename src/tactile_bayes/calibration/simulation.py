@@ -51,11 +51,9 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
         raise ReachError(
             f"the simulated rig reaches none of {_TRIALS} contours from the prior: reduce the misspecification"
         )
-    values = model.values(point)
-    cell = likelihood.load_cell
+    values, cell, scale = model.values(point), likelihood.load_cell, model.noise_scale(point)
     discrepancy = model.discrepancy(point, loads)
     sensed = model.unknowns.sensed(loads, values, cell)
-    scale = model.noise_scale(point)
     readings = cell.simulate(sensed, rng=rng, noise_scale=scale, discrepancy=discrepancy)[0]
     readings = readings * likelihood.rod.load_units
     template, cell = experiment.assumed.record, experiment.simulated.noise.cell

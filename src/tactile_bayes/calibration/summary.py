@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 import xarray as xr
@@ -26,17 +25,7 @@ CLAIMS = {
 }
 
 
-class Repeated(Protocol):
-    """An experiment that was repeated."""
-
-    @property
-    def identity(self) -> Mapping[str, str]: ...
-
-    @property
-    def probability(self) -> float: ...
-
-
-def summary(experiment: Repeated, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
+def summary(identity: Mapping[str, str], probability: float, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
     """Return the result of a calibration; see `calibrate`."""
     numbers = sorted(outcomes)
     rows = [outcomes[number] for number in numbers]
@@ -49,20 +38,20 @@ def summary(experiment: Repeated, outcomes: Mapping[int, Outcome]) -> xr.Dataset
     is_lost = np.array([row.is_lost for row in rows])
     for name in found:
         values[name][is_lost] = 0.0
-    shares = {name: values[name][np.isfinite(values[name])] for name in found}
-    coverage = [float(s.mean()) if s.size else np.nan for s in shares.values()]
-    errors = [float(s.std(ddof=1) / np.sqrt(s.size)) if s.size > 1 else np.nan for s in shares.values()]
+    shares = [_known(values[name]) for name in found]
+    coverage = [float(s.mean()) if s.size else np.nan for s in shares]
+    errors = [float(s.std(ddof=1) / np.sqrt(s.size)) if s.size > 1 else np.nan for s in shares]
     # The false-alarm rate is shared by all tests.
-    tested = int(np.isfinite(p_values).sum()) + sum(s.size >= FEWEST for s in shares.values())
+    tested = int(np.isfinite(p_values).sum()) + sum(s.size >= FEWEST for s in shares)
     level = FALSE_ALARM / max(tested, 1)
-    noticed = [_noticed_coverage(s, experiment.probability, level) for s in shares.values()]
+    noticed = [_noticed_coverage(s, probability, level) for s in shares]
     data = xr.Dataset(
         {
             "ranks": (("replicate", "quantity"), ranks, {"long_name": f"rank of the truth among {DRAWS} draws"}),
             "rank_p_value": ("quantity", p_values),
             "coverage": ("claim", coverage),
             "coverage_error": ("claim", errors),
-            "coverage_replicates": ("claim", [s.size for s in shares.values()]),
+            "coverage_replicates": ("claim", [s.size for s in shares]),
             "noticed_below": ("claim", [below for below, _ in noticed]),
             "noticed_above": ("claim", [above for _, above in noticed]),
             "message": ("replicate", [row.message for row in rows]),
@@ -75,12 +64,12 @@ def summary(experiment: Repeated, outcomes: Mapping[int, Outcome]) -> xr.Dataset
     tally = Tally(len(rows), int(is_lost.sum()), unconverged)
     # If many are lost, the verdict states their share, and faults are sought in the others.
     judged = data if tally.has_few_lost else data.isel(replicate=~is_lost)
-    faults = _faults(judged, experiment.probability, level)
+    faults = _faults(judged, probability, level)
     concluded = conclusion(tally, has_faults=bool(faults))
     left = len(rows) - tally.lost
     ranks_noticed = noticed_ranks(left, DRAWS, level, POWER) if left >= FEWEST else NoticedRanks(*3 * [np.nan])
     data.attrs = {
-        **experiment.identity,
+        **identity,
         "calibrated": int(concluded == "calibrated"),
         "conclusion": concluded,
         "false_alarm": FALSE_ALARM,
@@ -90,9 +79,14 @@ def summary(experiment: Repeated, outcomes: Mapping[int, Outcome]) -> xr.Dataset
         "replicates": tally.replicates,
         "lost": tally.lost,
         "not_converged": tally.unconverged,
-        "probability": experiment.probability,
+        "probability": probability,
     }
-    reason = _uniform_and_covered(data) if concluded == "calibrated" else "; ".join(message for _, message in faults)
+    reason = "; ".join(message for _, message in faults)
+    if concluded == "calibrated":
+        reason = (
+            f"ranks of the truth are uniform (smallest p of {len(names)} quantities {np.nanmin(p_values):.2g}), and "
+            f"bands and regions of {probability:.0%} hold as often as stated"
+        )
     lost = {number: row.message for number, row in zip(numbers, rows, strict=True) if row.is_lost}
     data.attrs["verdict"] = " ".join([statement(concluded, tally, reason), *_further(data, ranks_noticed, lost)])
     return data
@@ -102,6 +96,10 @@ def _noticed_coverage(shares: Floats, probability: float, level: float) -> tuple
     if shares.size < FEWEST:
         return np.nan, np.nan
     return noticed_coverage(shares.size, probability, level, POWER, is_whole=_is_whole(shares))
+
+
+def _known(values: Floats) -> Floats:
+    return values[np.isfinite(values)]
 
 
 def _is_whole(shares: Floats) -> bool:
@@ -121,8 +119,7 @@ def _faults(data: xr.Dataset, probability: float, level: float) -> list[tuple[fl
         if p_value <= level:
             faults.append((float(p_value), f"{name}: {_off(data['ranks'].sel(quantity=name).values, str(name))}"))
     for name in data.claim.values:
-        shares = data[str(name)].values
-        shares = shares[np.isfinite(shares)]
+        shares = _known(data[str(name)].values)
         if shares.size < FEWEST:
             continue
         share = float(shares.mean())
@@ -144,15 +141,6 @@ def _off(ranks: Index, name: str) -> str:
     return f"posteriors are too {'narrow' if spread > 0.0 else 'wide'}"
 
 
-def _uniform_and_covered(data: xr.Dataset) -> str:
-    """Return the reason why posteriors without a fault are called calibrated."""
-    least, stated = float(np.nanmin(data.rank_p_value)), data.attrs["probability"]
-    return (
-        f"ranks of the truth are uniform (smallest p of {data.sizes['quantity']} quantities {least:.2g}), and "
-        f"bands and regions of {stated:.0%} hold as often as stated"
-    )
-
-
 def _further(data: xr.Dataset, ranks_noticed: NoticedRanks, lost: Mapping[int, str]) -> list[str]:
     """Return the further sentences of a verdict: coverage, power, record check, unconverged and lost replicates."""
     sentences, probability = [], data.attrs["probability"]
@@ -167,7 +155,7 @@ def _further(data: xr.Dataset, ranks_noticed: NoticedRanks, lost: Mapping[int, s
     if np.isfinite([below, *ranks_noticed]).any():
         sentences.append(power_message(probability, below, above, ranks_noticed))
     if "check_passed" in data:
-        passed = data.check_passed.values[np.isfinite(data.check_passed.values)]
+        passed = _known(data.check_passed.values)
         sentences.append(f"The check of the record raises an alarm in {np.mean(passed == 0.0):.1%} of {passed.size}.")
     if data.attrs["not_converged"]:
         sentences.append(f"{data.attrs['not_converged']} did not converge, and are included.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -29,12 +29,12 @@ Method = Literal["raw", "constrained"]
 METHODS: tuple[Method, ...] = ("raw", "constrained")
 SOURCES = (*CHANNELS, "drive_angle")
 
-_COLUMNS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
+COLUMNS_OF_SAMPLES = ["sweep", "direction", "base_x", "base_y", "drive_angle"]
 _TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_phase")
 
 # Default distances of samples from first contact and from snap-off, over the sweep's length.
 _NEAR = np.geomspace(1e-5, 0.5, 41)
-_EVENLY = (np.arange(60) + 0.5) / 60  # default positions of further samples, over the sweep's length
+_EVENLY = 60  # default number of further samples, evenly over the sweep's length
 # Distances from an event between which errors follow a power of the distance, over the sweep's length.
 _POWER_LAW = (1e-5, 1e-3)
 # Free contact coordinates, in tip contact (True) and in tangential contact (False).
@@ -66,60 +66,51 @@ def amplification(plan: Plan) -> xr.Dataset:
     `contact_coordinates`). The constrained estimate is, to first order, the weighted least-squares solution on the
     surface of possible contacts.
     """
-    refined = _refined(plan)
+    return contact_errors(_refined(plan))
+
+
+def contact_errors(plan: Plan) -> xr.Dataset:
+    """Return the errors of `amplification` at the loaded samples of the plan's own record."""
     for name, what in (("suspension_compliance", "a pivot"), ("contact_compliance", "an object")):
         if plan.rig.known.get(name):
             raise ParameterError(f"{name} is known, and amplification is of {what} that does not yield: leave it out")
-    record, rod = refined.scan.record, plan.rig.known_rod
+    record, rod = plan.scan.record, plan.rig.known_rod
     loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
     chosen = record.isel(sample=loaded)
-    contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.friction))
+    contacts, delta = _forward(plan, record, loaded), float(np.arctan(plan.friction))
     of_angle = plan.cell.drive_angle_deviation
     gains = (_raw(contacts), _constrained(contacts, delta, of_angle))
-    both = [_along_and_across(contacts, gain, rod.surface) for gain in gains]
+    both = [_gains_along_and_across(contacts, gain, rod.surface) for gain in gains]
     deviations = [[_deviation(gain, contacts, of_angle) for gain in of_method] for of_method in both]
     # Readings are in the units of the record, not in EI/L or EI/L².
     per_unit = rod.length / np.array([*rod.load_units, 1.0])
-    distances = _distances(refined, chosen.sweep.values, travels_of(record)[loaded])
-    sweeps = [chosen.sweep.values == k for k in range(len(refined.scan.sweeps))]
-    growth = np.array(
-        [
-            [[[_growth(sd[of], far[of]) for far in distances] for of in sweeps] for sd in of_method]
-            for of_method in deviations
-        ]
-    )
+    distances = event_distances(plan, chosen.sweep.values, travels_of(record)[loaded])
     unit = {"units": COLUMNS["base_x"].unit_in(record.attrs["units"])}
-    along = {"units": travel_unit(record)}
-    dims = ("reconstruction", "sample")
+    dims, of_segments = ("reconstruction", "sample"), ("reconstruction", "segment", "event")
     gain, sd = np.array(both) * per_unit, np.array(deviations) * rod.length
+    sweeps = [chosen.sweep.values == k for k in range(len(plan.scan.sweeps))]
+    variables: dict[str, Any] = {}
+    for k, way in enumerate(("along", "across")):
+        variables[f"gain_{way}"] = ((*dims, "source"), gain[:, k])
+        variables[f"sd_{way}"] = (dims, sd[:, k], unit)
+        growth = [[[_growth(one[of], far[of]) for far in distances.values()] for of in sweeps] for one in sd[:, k]]
+        variables[f"growth_{way}"] = (of_segments, np.array(growth))
+    holds = [plan.reconstruct(plan.record, method).status.values[loaded] == "ok" for method in METHODS]
     return xr.Dataset(
         {
-            **{name: ("sample", chosen[name].values, chosen[name].attrs) for name in _COLUMNS},
-            **{name: ("sample", chosen[f"truth_{name}"].values, chosen[f"truth_{name}"].attrs) for name in _TRUTHS},
-            "after_first_contact": ("sample", distances[0], along),
-            "before_snap_off": ("sample", distances[1], along),
-            "gain_along": ((*dims, "source"), gain[:, 0]),
-            "gain_across": ((*dims, "source"), gain[:, 1]),
-            "sd_along": (dims, sd[:, 0], unit),
-            "sd_across": (dims, sd[:, 1], unit),
-            "holds": (dims, np.array([_holds(refined, method)[loaded] for method in METHODS])),
-            "growth_along": (("reconstruction", "segment", "event"), growth[:, 0]),
-            "growth_across": (("reconstruction", "segment", "event"), growth[:, 1]),
+            **chosen[COLUMNS_OF_SAMPLES].data_vars,
+            **{name: chosen[f"truth_{name}"] for name in _TRUTHS},
+            **{name: ("sample", far, {"units": travel_unit(record)}) for name, far in distances.items()},
+            **variables,
+            "holds": (dims, np.array(holds)),
         },
         coords={
             "reconstruction": list(METHODS),
             "source": list(SOURCES),
             "event": ["first contact", "snap-off"],
-            "segment": [
-                f"{sweep.direction} from ({sweep.base[0]:g}, {sweep.base[1]:g})" for sweep in refined.scan.sweeps
-            ],
+            "segment": [f"{sweep.direction} from ({sweep.base[0]:g}, {sweep.base[1]:g})" for sweep in plan.scan.sweeps],
         },
     )
-
-
-def _holds(plan: Plan, method: Method) -> Flags:
-    """Return True for samples to which `reconstruct` gives the status "ok"."""
-    return np.asarray(plan.reconstruct(plan.record, method).status.values == "ok")
 
 
 def _refined(plan: Plan) -> Plan:
@@ -129,14 +120,21 @@ def _refined(plan: Plan) -> Plan:
     """
     if any(isinstance(drive, Rotation) and drive.drive_angles is not None for drive in plan.drives):
         return plan
-    angles = []
-    carried = carried_sweeps(plan.scan.record)
-    for number, sweep in enumerate(plan.scan.sweeps):
-        if number in carried:
-            continue
-        first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
-        angles += [first + (snap - first) * ways for ways in (_NEAR, 1.0 - _NEAR, _EVENLY)]
-    return plan.at_angles(np.concatenate(angles)) if angles else plan
+    shares = np.concatenate([_NEAR, 1.0 - _NEAR, even_shares(_EVENLY)])
+    turned = set(range(len(plan.scan.sweeps))) - set(carried_sweeps(plan.scan.record))
+    return plan.at_angles(np.concatenate([angles_within(plan, k, shares) for k in turned])) if turned else plan
+
+
+def even_shares(count: int) -> Floats:
+    """Return the middles of equal parts of the interval from 0 to 1."""
+    return (np.arange(count) + 0.5) / count
+
+
+def angles_within(plan: Plan, sweep: int, shares: Floats) -> Floats:
+    """Return drive angles at shares of the way from first contact to snap-off of a sweep."""
+    one = plan.scan.sweeps[sweep]
+    first, snap = one.first_contact.drive_angle, one.snap_off.drive_angle
+    return np.asarray(first + (snap - first) * shares)
 
 
 def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
@@ -211,12 +209,18 @@ def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Fl
     return gains
 
 
-def _along_and_across(contacts: _Forward, gain: Floats, surface: Surface) -> tuple[Floats, Floats]:
+def along_and_across(x: Floats, y: Floats, slope_angle: Floats) -> tuple[Floats, Floats]:
+    """Return the components of vectors along and across a contour of these slope angles."""
+    cos, sin = np.cos(slope_angle), np.sin(slope_angle)
+    return cos * x + sin * y, cos * y - sin * x
+
+
+def _gains_along_and_across(contacts: _Forward, gain: Floats, surface: Surface) -> tuple[Floats, Floats]:
     """Return derivatives of the contact along and across the contour, in the laboratory frame, shape (n, 4) each."""
-    cos, sin = np.cos(contacts.slope_angle)[:, None], np.sin(contacts.slope_angle)[:, None]
+    along, across = along_and_across(gain[:, 0], gain[:, 1], contacts.slope_angle[:, None])
     standoff, closer = surface.standoff(contacts.coordinates[:, ARCLENGTH])[:, None], np.sin(surface.half_angle)
-    along = cos * gain[:, 0] + sin * gain[:, 1] - standoff * gain[:, 2]  # the surface turns with the slope
-    return contacts.side[:, None] * along, cos * gain[:, 1] - sin * gain[:, 0] - closer * gain[:, 3]
+    along = along - standoff * gain[:, 2]  # the surface turns with the slope
+    return contacts.side[:, None] * along, across - closer * gain[:, 3]
 
 
 def _deviation(gain: Floats, contacts: _Forward, angle_deviation: float) -> Floats:
@@ -226,12 +230,10 @@ def _deviation(gain: Floats, contacts: _Forward, angle_deviation: float) -> Floa
     return np.asarray(np.sqrt(variance + (gain[:, 3] * angle_deviation) ** 2))
 
 
-def _distances(plan: Plan, sweep: Index, travel: Floats) -> tuple[Floats, Floats]:
-    """Return the distances along the drive from first contact and from snap-off [rad or length]."""
-    sweeps = plan.scan.sweeps
-    first = np.array([one.first_contact.travel for one in sweeps])[sweep]
-    snap = np.array([one.snap_off.travel for one in sweeps])[sweep]
-    return np.abs(travel - first), np.abs(snap - travel)
+def event_distances(plan: Plan, sweep: Index, travel: Floats) -> dict[str, Floats]:
+    """Return the distances along the drive of samples from first contact and from snap-off [rad or length]."""
+    ends = np.array([(one.first_contact.travel, one.snap_off.travel) for one in plan.scan.sweeps])[sweep].T
+    return dict(zip(("after_first_contact", "before_snap_off"), np.abs(travel - ends), strict=True))
 
 
 def _growth(deviation: Floats, distance: Floats) -> float:

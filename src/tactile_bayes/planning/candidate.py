@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,14 @@ from tactile_bayes.inference.importance import weighed
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.random_numbers import Seed, words
-from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, mean_of_known
+from tactile_bayes.planning.expected_band import (
+    band_factor,
+    deviation_of_heights,
+    height_slopes,
+    heights_of,
+    joined_arcs,
+    mean_of_known,
+)
 from tactile_bayes.planning.knowledge import COARSE, STEP, Base, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
@@ -105,50 +114,38 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     The information about a draw is that of the drives that touch it.
     """
     question, number = task
-    candidate = question.candidates[number]
-    wide = band_factor(question.probability)
-    touched = np.stack([_usable(question.known, drive) for drive in candidate.drives], axis=1)
+    known, candidate = question.known, question.candidates[number]
+    touched = np.stack([_usable(known, drive) for drive in candidate.drives], axis=1)
     usable: Flags = np.any(touched, axis=1, keepdims=False)
-    rows: dict[str, list[float]] = {
-        name: [] for name in ("width", "information", "nested_width", "nested_information", "draws")
-    }
-    numbers = np.asarray([*candidate.base, candidate.drive_step])
-    paths = [drive.poses.ravel() for drive in candidate.drives if isinstance(drive, Carried)]
-    numbers = np.concatenate([numbers, *paths])
-    rng = np.random.default_rng([*words(question.seed), *numbers.view(np.uint32)])
-    by_touch: dict[bytes, tuple[Question, ContourModel]] = {}
-    for k, touches in enumerate(touched):
-        if touches.tobytes() not in by_touch:
-            drives = [drive for drive, it in zip(candidate.drives, touches, strict=True) if it or not touches.any()]
-            model = question.known.model_from(drives)
-            by_touch[touches.tobytes()] = replace(question, known=question.known.of(model)), model
-        of_draw, model = by_touch[touches.tobytes()]
-        known, point = of_draw.known, of_draw.known.points[k]
-        slopes = height_slopes(model, point, question.x)
-        gained = np.zeros_like(known.precision)
+    patterns, pattern_of = np.unique(touched, axis=0, return_inverse=True)
+    drives = [[one for one, it in zip(candidate.drives, row, strict=True) if it or not row.any()] for row in patterns]
+    models = [known.model_from(some) for some in drives]
+    rng, wide = _random(question.seed, candidate), band_factor(question.probability)
+    rows = np.full((len(touched), 5), np.nan)  # width and information by Laplace's approximation, then those of _nested
+    for k, pattern in enumerate(pattern_of.ravel()):
+        model = models[pattern]
+        own = known.of(model)
+        point, precision = own.points[k], own.precision
         if usable[k]:
-            try:
-                gained = record_information(model, point, slopes=reading_slopes(model, point, COARSE_STEP)).matrix
-            except ReachError:
-                gained = np.zeros_like(known.precision)
-        precision = known.precision + gained
-        rows["width"].append(wide * mean_of_known(deviation_of_heights(slopes, precision)))
-        rows["information"].append(0.5 * (_logdet(precision) - _logdet(known.precision)))
+            with suppress(ReachError):
+                slopes = reading_slopes(model, point, COARSE_STEP)
+                precision = precision + record_information(model, point, slopes=slopes).matrix
+        deviations = deviation_of_heights(height_slopes(model, point, question.x), precision)
+        rows[k, 0] = wide * mean_of_known(deviations)
+        rows[k, 1] = 0.5 * (_logdet(precision) - _logdet(own.precision))
         if question.nested and usable[k]:
-            found = _nested(of_draw, model, point, precision, rng)
-            for name, value in zip(("nested_width", "nested_information", "draws"), found, strict=True):
-                rows[name].append(value)
-    gaps = _gaps(question.known, candidate, usable)
-    means = {name: _mean(np.array(values)) for name, values in rows.items()}
-    return Expected(
-        means["width"],
-        _mean(gaps),
-        means["information"],
-        float(usable.mean()),
-        means["nested_width"],
-        means["nested_information"],
-        float(np.median(rows["draws"])) if rows["draws"] else np.nan,
-    )
+            rows[k, 2:] = _nested(question, own, model, point, precision, rng)
+    width, information, nested_width, nested_information, _ = map(_mean, rows.T)
+    gap, draws = _mean(_gaps(known, candidate, usable)), rows[usable, -1]
+    nested_draws = float(np.median(draws)) if draws.size else np.nan
+    return Expected(width, gap, information, float(usable.mean()), nested_width, nested_information, nested_draws)
+
+
+def _random(seed: Seed, candidate: Candidate) -> np.random.Generator:
+    """Return the random numbers of a candidate, which do not depend on the others."""
+    paths = [drive.poses.ravel() for drive in candidate.drives if isinstance(drive, Carried)]
+    numbers = np.concatenate([[*candidate.base, candidate.drive_step], *paths])
+    return np.random.default_rng([*words(seed), *numbers.view(np.uint32)])
 
 
 def _usable(known: Knowledge, drive: Drive) -> Flags:
@@ -159,13 +156,17 @@ def _usable(known: Knowledge, drive: Drive) -> Flags:
 
 
 def _nested(
-    question: Question, model: ContourModel, point: Floats, precision: Floats, rng: np.random.Generator
+    question: Question,
+    known: Knowledge,
+    model: ContourModel,
+    point: Floats,
+    precision: Floats,
+    rng: np.random.Generator,
 ) -> tuple[float, float, float]:
     """Return width of the band, information gained and effective draws of the posterior of one simulated record.
 
     The posterior is sampled by importance sampling from a t distribution about the mode of Laplace's approximation.
     """
-    known = question.known
     measured = measured_of(model, point, rng)
     after = known.model(measured)
     steps = COARSE_STEP * parameter_scales(after, point)
@@ -186,23 +187,17 @@ def _nested(
     logs, evidence = weighed(densities(points).sum(axis=1) + log_known - density - proposal.constant)
     weights = np.exp(logs)
     likely = weights > 0.0
-    contours = model.family.build(*points[likely, : len(model.family.parameters)].T)
-    heights = np.asarray(contours.take(np.arange(contours.shape[0])[:, None]).height(question.x))
+    heights = heights_of(model, points[likely], question.x)
     width = mean_of_known(_band_widths(heights, weights[likely], question.probability))
-    own = float(densities(point[None]).sum())
-    return width, own - float(evidence), float(effective_number(weights))
+    return width, float(densities(point[None]).sum() - evidence), float(effective_number(weights))
 
 
 def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) -> xr.Dataset:
     """Return a simulated measurement of the model's record, of one truth, shape (d,)."""
-    loads = model.loads(point[None])[0]
-    discrepancy = model.discrepancy_at(point)
-    rod = model.likelihood.rod
-    units = rod.load_units
-    cell = model.likelihood.load_cell
-    scale = model.noise_scale(point[None])[0]
-    readings = cell.simulate(loads, rng=rng, noise_scale=scale, discrepancy=discrepancy) * units
-    template = model.measured
+    loads, scale = model.loads(point[None])[0], model.noise_scale(point[None])[0]
+    cell, template = model.likelihood.load_cell, model.measured
+    readings = cell.simulate(loads, rng=rng, noise_scale=scale, discrepancy=model.discrepancy_at(point))
+    readings = readings * model.likelihood.rod.load_units
     return template.assign({name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)})
 
 
@@ -211,49 +206,39 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
 
     They are those of the draws that have a height there; NaN where none has.
     """
-    levels = central_levels(probability)
-    widths, known = np.full(heights.shape[1], np.nan), ~np.isnan(heights)
-    for k in np.flatnonzero(known.any(axis=0)):
-        one, its_weights = heights[known[:, k], k], weights[known[:, k]]
-        lower, _, upper = np.quantile(one, levels, weights=its_weights, method="inverted_cdf")
-        widths[k] = upper - lower
+    widths, known = np.full(heights.shape[1], np.nan), ~np.isnan(heights).all(axis=0)
+    of_each = np.broadcast_to(weights[:, None], heights[:, known].shape)
+    levels = central_levels(probability)[::2]
+    widths[known] = np.ptp(
+        np.nanquantile(heights[:, known], levels, axis=0, weights=of_each, method="inverted_cdf"), axis=0
+    )
     return widths
 
 
 def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:
     """Return the width that no sweep touches between the outermost first contacts, for each usable draw."""
-    model = known.model_from([*known.drives, *map(_coarse, candidate.drives)], COARSE)
+    drives = [
+        replace(drive, drive_angles=None, drive_step=None) if isinstance(drive, Rotation) else drive
+        for drive in candidate.drives
+    ]
+    model = known.model_from([*known.drives, *drives], COARSE)
     points = known.of(model).points[usable]
     if not len(points):
         return np.array([np.nan])
     found = events_of(model.likelihood, model.contours(points), model.rig(points), exact=False)
-    ends = np.sort(np.stack([found["first_contact_x"], found["snap_off_contact_x"]], axis=-1), axis=-1)
+    ends = np.stack([found["first_contact_x"], found["snap_off_contact_x"]], axis=-1)
     gaps = []
     for of_draw in ends:
-        arcs = sorted(map(tuple, of_draw[np.isfinite(of_draw).all(axis=1)]))
-        if not arcs:
-            gaps.append(np.nan)
-            continue
-        reach, open_width = arcs[0][1], 0.0
-        for begin, end in arcs[1:]:
-            open_width += max(0.0, begin - reach)
-            reach = max(reach, end)
-        gaps.append(open_width)
-    return np.array(gaps)
-
-
-def _coarse(drive: Drive) -> Drive:
-    """Return a drive without a grid of its own."""
-    return replace(drive, drive_angles=None, drive_step=None) if isinstance(drive, Rotation) else drive
+        arcs = joined_arcs(of_draw[np.isfinite(of_draw).all(axis=1)].tolist())
+        gaps.append(sum(after[0] - before[1] for before, after in pairwise(arcs)) if arcs else np.nan)
+    return np.array(gaps, dtype=float)
 
 
 def _mean(values: Floats) -> tuple[float, float]:
     """Return the mean and its standard error, of what is known; NaN if unknown."""
     values = values[~np.isnan(values)]
-    if not values.size:
-        return np.nan, np.nan
     error = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else np.nan
-    return float(values.mean()), error
+    return mean_of_known(values), error
 
 
 def _logdet(precision: Floats) -> float:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Literal
@@ -14,7 +13,6 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     check_choice,
     check_numbers,
@@ -131,13 +129,12 @@ def design(
     xr.Dataset
         Over "candidate", with base_x, base_y (the pivot, or where the first drive begins) [length], drive_step (of the
         first drive, or of a rotation with as many samples) [rad], drive, in words, is_pivot (whether it turns about one
-        pivot), and samples, the number of readings of its record, by which candidates that take the same time can be
-        chosen:
+        pivot), and samples, the number of readings of its record:
 
         width, width_error
             Expected mean width of the band over the span, as far as an object has heights there [length], and its
             standard error over draws. For objects that the rod does not reach it is the present width, and few of them
-            dominate the mean: more draws, and `reached`, show whether there are any.
+            dominate the mean.
         gap, gap_error
             Width of the arcs that no sweep touches, those so far included, between the outermost contacts [length].
         information, information_error
@@ -181,16 +178,16 @@ def design(
     True
     """
     criterion = criterion if isinstance(criterion, Criterion) else Criterion(criterion)
-    check_whole_number("draws", draws, 2)
+    draws = check_whole_number("draws", draws, 2)
     check_switch("nested", nested)
     seed = seed_sequence(rng)
     draws_from = np.random.default_rng([*words(seed), 1])
     if isinstance(known, str | Family):
-        knowledge = known_from_prior(rig_of(rig), family_of(known), draws=int(draws), rng=draws_from)
+        knowledge = known_from_prior(rig_of(rig), family_of(known), draws=draws, rng=draws_from)
     elif rig is not None:
         raise ParameterError("a rig and a posterior, which has its own: leave one of the two")
     else:
-        knowledge = known_from_posterior(known, draws=int(draws), rng=draws_from)
+        knowledge = known_from_posterior(known, draws=draws, rng=draws_from)
     candidates = _candidates(usual_drives(known, rig) if drives is None else drives)
     x = np.linspace(*(criterion.span or _span(knowledge)), _GRID_POINTS)
     question = Question(knowledge, candidates, x, criterion.probability, _NESTED if nested else 0, seed)
@@ -216,12 +213,12 @@ def usual_drives(
     drive_step : float, optional
         As in `Rotation`.
     """
-    record = record_of(known) if isinstance(known, xr.DataTree) else None
-    drives = [] if record is None else recorded_drives(record)
+    drives, rod = [], rig_of(rig).rod or Rod()
+    if isinstance(known, xr.DataTree):
+        record = record_of(known)
+        drives, rod = recorded_drives(record), rod_of(record)
     x, y = next((drive.base for drive in drives if isinstance(drive, Rotation)), (0.0, 0.0))
-    stated = rig_of(rig).rod or Rod()
-    length = (stated if record is None else rod_of(record)).length
-    pivots = [(float(x + length * dx), float(y + length * dy)) for dy in _ABOVE for dx in _ACROSS]
+    pivots = [(float(x + rod.length * dx), float(y + rod.length * dy)) for dy in _ABOVE for dx in _ACROSS]
     return [Rotation(pivot, drive_step=drive_step) for pivot in pivots]
 
 
@@ -238,14 +235,13 @@ def _candidates(drives: Any) -> tuple[Candidate, ...]:
 
 def _out_of_reach(question: Question) -> str:
     """Return the message that no candidate reaches an object."""
-    known, pivots = question.known, np.array([candidate.base for candidate in question.candidates])
-    unit = "" if known.rod.is_dimensionless else " m"
-    (left, low), (right, high) = pivots.min(axis=0), pivots.max(axis=0)
-    across = f"x = {left:g}" if left == right else f"x from {left:g} to {right:g}"
-    above = f"y = {low:g}" if low == high else f"y from {low:g} to {high:g}"
+    rod, unit, ranges = question.known.rod, "" if question.known.rod.is_dimensionless else " m", []
+    for axis, places in zip("xy", np.transpose([candidate.base for candidate in question.candidates]), strict=True):
+        low, high = places.min(), places.max()
+        ranges.append(f"{axis} = {low:g}{unit}" if low == high else f"{axis} from {low:g} to {high:g}{unit}")
     return (
-        f"the rod, {known.rod.length:g}{unit or ' L'} long, reaches no possible object from any candidate, at "
-        f"{across}{unit} and {above}{unit}: give others, nearer to it, in that unit"
+        f"the rod, {rod.length:g}{unit or ' L'} long, reaches no possible object from any candidate, at "
+        f"{' and '.join(ranges)}: give others, nearer to it, in that unit"
     )
 
 
@@ -260,54 +256,37 @@ def _span(knowledge: Knowledge) -> tuple[float, float]:
 def _labelled(question: Question, expected: Sequence[Expected], criterion: CriterionName) -> xr.Dataset:
     """Return the result of a design; see `design`."""
     known, candidates = question.known, question.candidates
-    metres = {"units": "1" if known.rod.is_dimensionless else "m"}
-
-    def column(name: str, part: int, attrs: Mapping[str, Any]) -> tuple[str, Floats, Mapping[str, Any]]:
-        return "candidate", np.array([getattr(row, name)[part] for row in expected]), attrs
-
-    variables: dict[str, Any] = {
-        "base_x": ("candidate", np.array([candidate.base[0] for candidate in candidates]), metres),
-        "base_y": ("candidate", np.array([candidate.base[1] for candidate in candidates]), metres),
-        "drive": ("candidate", np.array([candidate.words for candidate in candidates])),
-        "is_pivot": ("candidate", np.array([candidate.is_pivot for candidate in candidates])),
-        "samples": ("candidate", np.array([_samples(known, candidate) for candidate in candidates])),
-        "drive_step": ("candidate", np.array([candidate.drive_step for candidate in candidates]), {"units": "rad"}),
-        "reached": ("candidate", np.array([row.reached for row in expected])),
-        "nested_draws": ("candidate", np.array([row.nested_draws for row in expected])),
+    metres, nats = {"units": "1" if known.rod.is_dimensionless else "m"}, {"units": "nat"}
+    columns: dict[str, tuple[Sequence[Any], dict[str, str]]] = {
+        "base_x": ([candidate.base[0] for candidate in candidates], metres),
+        "base_y": ([candidate.base[1] for candidate in candidates], metres),
+        "drive": ([candidate.words for candidate in candidates], {}),
+        "is_pivot": ([candidate.is_pivot for candidate in candidates], {}),
+        "samples": ([known.model_from(candidate.drives).measured.sizes["sample"] for candidate in candidates], {}),
+        "drive_step": ([candidate.drive_step for candidate in candidates], {"units": "rad"}),
+        "reached": ([row.reached for row in expected], {}),
+        "nested_draws": ([row.nested_draws for row in expected], {}),
     }
-    for name, attrs in (
-        ("width", metres),
-        ("gap", metres),
-        ("information", {"units": "nat"}),
-        ("nested_width", metres),
-        ("nested_information", {"units": "nat"}),
-    ):
-        variables[name], variables[f"{name}_error"] = column(name, 0, attrs), column(name, 1, attrs)
-    wanted = {"band": "width", "gap": "gap", "information": "information"}[criterion]
-    values = variables[wanted][1]
+    for name in ("width", "gap", "information", "nested_width", "nested_information"):
+        means, errors = zip(*(getattr(row, name) for row in expected), strict=True)
+        unit = nats if name.endswith("information") else metres
+        columns |= {name: (means, unit), f"{name}_error": (errors, unit)}
+    values = np.array(columns["width" if criterion == "band" else criterion][0])
     order = -values if criterion == "information" else values
-    best = int(np.nanargmin(np.where(np.isfinite(order), order, np.inf)))
-    for k, name in enumerate(("present_base_x", "present_base_y")):
-        variables[name] = ("pivot", np.array([base[k] for base in known.bases], dtype=float), metres)
+    best = int(np.argmin(np.where(np.isfinite(order), order, np.inf)))
+    slopes = [height_slopes(known.experiment.model, point, question.x) for point in known.points]
+    present = np.array([mean_of_known(deviation_of_heights(of, known.precision)) for of in slopes])
+    bases = np.reshape(known.bases, (-1, 2)).T
     return xr.Dataset(
-        {**variables, "present_width": ((), _present_width(question), metres), "best": ((), best)},
+        {
+            **{name: ("candidate", np.array(numbers), attrs) for name, (numbers, attrs) in columns.items()},
+            **{f"present_base_{axis}": ("pivot", of, metres) for axis, of in zip("xy", bases, strict=True)},
+            "present_width": ((), band_factor(question.probability) * mean_of_known(present), metres),
+            "best": ((), best),
+        },
         coords={"x": ("x", question.x, metres)},
         attrs={"criterion": criterion, "probability": question.probability, "family": known.experiment.own_family.name},
     )
-
-
-def _samples(known: Knowledge, candidate: Candidate) -> int:
-    """Return the number of samples of a candidate's record."""
-    return int(known.model_from(candidate.drives).measured.sizes["sample"])
-
-
-def _present_width(question: Question) -> float:
-    """Return the mean width of the band without a further record."""
-    known = question.known
-    wide = band_factor(question.probability)
-    slopes = [height_slopes(known.experiment.model, point, question.x) for point in known.points]
-    widths = [mean_of_known(deviation_of_heights(of, known.precision)) for of in slopes]
-    return wide * mean_of_known(np.array(widths))
 
 
 def _identity(question: Question) -> dict[str, str]:
@@ -326,13 +305,8 @@ def _identity(question: Question) -> dict[str, str]:
 
 
 def _decode(row: dict[str, Any]) -> Expected:
-    def read(value: Any) -> Any:
-        if isinstance(value, list):
-            mean, error = value
-            return read(mean), read(error)
-        return math.nan if value is None else float(value)
-
-    return Expected(**{name: read(row[name]) for name in Expected._fields})
+    """Return the results from a row of the store, in which None stands for NaN."""
+    return Expected(*(np.array(row[name], dtype=float).tolist() for name in Expected._fields))
 
 
 CANDIDATES = Kind("candidates", StudyError, Expected._asdict, _decode)

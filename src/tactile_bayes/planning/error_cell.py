@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ContourError, InferenceError, ReachError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, child
-from tactile_bayes.planning.amplification import METHODS, amplification
-from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
+from tactile_bayes.planning.amplification import METHODS, along_and_across, contact_errors
+from tactile_bayes.planning.expected_band import stretches
+from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.planning.record_information import prior_precision, record_information
 from tactile_bayes.sweep import Rotation
 from tactile_bayes.uncertainty.band import contour_band
 
@@ -74,75 +74,40 @@ def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
             scan = plan.scan
     except (ReachError, ContourError) as error:
         return CellOutcome({}, f"{type(error).__name__}: {error}")
-    numbers: dict[str, float] = {}
-    numbers["gap_width"] = sum(stretch.end - stretch.begin for stretch in stretches(scan) if stretch.name == "gap")
-    numbers |= _expected(plan, study.probability)
+    gap_width = sum(stretch.end - stretch.begin for stretch in stretches(scan) if stretch.name == "gap")
+    expected = information(plan, probability=study.probability)
+    widths = {f"expected_{kind}_width": float(expected[f"{kind}_width"]) for kind in ("touched", "gap")}
     seeds = child(study.seed, number).spawn(study.replicates)
     rig = replace(plan.rig, load_cell=plan.cell)
     measured = [rig.measure(scan.record, rng=seed) for seed in seeds]
-    numbers |= _reconstructed(plan, measured)
-    numbers |= _inferred(
-        plan, measured[: study.posteriors.get(number, 0)], study.probability, child(study.seed, number, 1)
-    )
-    return CellOutcome(numbers, "ok")
-
-
-def _expected(plan: Plan, probability: float) -> dict[str, float]:
-    """Return the mean widths of the expected bands."""
-    model, point = plan.model, plan.point
-    precision = record_information(model, point).matrix + prior_precision(model)
-    wide = band_factor(probability)
-    widths: dict[str, list[Floats]] = {"touched": [], "gap": []}
-    for stretch in stretches(plan.scan):
-        widths[stretch.name].append(deviation_of_heights(height_slopes(model, point, stretch.x), precision))
-    return {
-        f"expected_{name}_width": wide * float(np.concatenate(found).mean()) if found else math.nan
-        for name, found in widths.items()
-    }
+    some = measured[: study.posteriors.get(number, 0)]
+    inferred = _inferred(plan, some, study.probability, child(study.seed, number, 1))
+    return CellOutcome({"gap_width": gap_width, **widths, **_reconstructed(plan, measured), **inferred}, "ok")
 
 
 def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
     """Return root mean square errors of contacts with the status "ok" over all replicates, and those of first order."""
-    record = plan.scan.record
-    loaded = record.truth_contact_phase.values != "none"
-    grown = amplification(plan.at_angles(record.drive_angle.values))
-    first = {
-        name: {
-            (int(sweep), float(angle)): value
-            for sweep, angle, value in zip(grown.sweep.values, grown.drive_angle.values, values.T, strict=True)
-        }
-        for name, values in (("along", grown.sd_along.values), ("across", grown.sd_across.values))
-    }
-    keys = list(zip(record.sweep.values[loaded].tolist(), record.drive_angle.values[loaded].tolist(), strict=True))
-    slope = record.truth_slope_angle.values[loaded]
-    cos, sin = np.cos(slope), np.sin(slope)
+    truth = plan.scan.record
+    loaded = np.flatnonzero(truth.truth_contact_phase.values != "none")
+    truth, grown = truth.isel(sample=loaded), contact_errors(plan)
     numbers: dict[str, float] = {}
-    for m, method in enumerate(METHODS):
-        sd = {name: np.array([of[key][m] for key in keys]) for name, of in first.items()}
-        squares, counts = {"along": 0.0, "across": 0.0}, 0
-        predicted = {"along": 0.0, "across": 0.0}
-        unanswered, every = 0, 0
-        sizes: list[Floats] = []
-        for one in measured:
-            found = plan.reconstruct(one, method)
-            x = found.contact_x.values[loaded] - record.truth_contact_x.values[loaded]
-            y = found.contact_y.values[loaded] - record.truth_contact_y.values[loaded]
-            ok = found.status.values[loaded] == "ok"
-            errors = {"along": cos * x + sin * y, "across": cos * y - sin * x}
-            for name, error in errors.items():
-                squares[name] += float(np.sum(error[ok] ** 2))
-                predicted[name] += float(np.sum(sd[name][ok] ** 2))
-            counts += int(ok.sum())
-            missing = np.isnan(x)
-            unanswered, every = unanswered + int(missing.sum()), every + missing.size
-            sizes.append(np.hypot(x, y)[~missing])
-        for name in squares:
-            numbers[f"{method}_rms_{name}"] = math.sqrt(squares[name] / counts) if counts else math.nan
-            numbers[f"{method}_first_order_{name}"] = math.sqrt(predicted[name] / counts) if counts else math.nan
-        joined = np.concatenate(sizes)
-        numbers[f"{method}_median_error"] = float(np.median(joined)) if joined.size else math.nan
-        numbers[f"{method}_without_answer"] = unanswered / every if every else math.nan
-        numbers[f"{method}_ok"] = counts / every if every else math.nan
+    for method in METHODS:
+        found = [plan.reconstruct(one, method).isel(sample=loaded) for one in measured]
+        x, y = (
+            np.stack([one[name].values for one in found]) - truth[f"truth_{name}"].values
+            for name in ("contact_x", "contact_y")
+        )
+        ok = np.stack([one.status.values == "ok" for one in found])
+        errors = zip(("along", "across"), along_and_across(x, y, truth.truth_slope_angle.values), strict=True)
+        for name, error in errors:
+            sd = np.broadcast_to(grown[f"sd_{name}"].sel(reconstruction=method).values, ok.shape)
+            numbers[f"{method}_rms_{name}"] = math.sqrt(_mean(error[ok] ** 2))
+            numbers[f"{method}_first_order_{name}"] = math.sqrt(_mean(sd[ok] ** 2))
+        has_answer = ~np.isnan(x)
+        sizes = np.hypot(x, y)[has_answer]
+        numbers[f"{method}_median_error"] = float(np.median(sizes)) if sizes.size else math.nan
+        numbers[f"{method}_without_answer"] = _mean(~has_answer)
+        numbers[f"{method}_ok"] = _mean(ok)
     return numbers
 
 
@@ -150,10 +115,9 @@ def _inferred(
     plan: Plan, measured: list[xr.Dataset], probability: float, seed: np.random.SeedSequence
 ) -> dict[str, float]:
     """Return mean widths of posterior bands, and the share of grid points at which they contain the contour."""
-    numbers: dict[str, float] = {}
     widths: dict[str, list[float]] = {"touched": [], "gap": []}
     held: dict[str, list[float]] = {"touched": [], "gap": []}
-    failed = 0
+    failed = []
     for one, own in zip(measured, seed.spawn(len(measured)), strict=True):
         try:
             posterior = sampled(
@@ -162,16 +126,19 @@ def _inferred(
                 seed=own,
             ).tree
         except InferenceError:
-            failed += 1
+            failed.append(True)
             continue
+        failed.append(False)
         for stretch in stretches(plan.scan):
             band = contour_band(posterior, stretch.x, probability)
             height = np.asarray(plan.contour.height(stretch.x))
             widths[stretch.name].append(float(np.mean(band.upper.values - band.lower.values)))
             held[stretch.name].append(float(np.mean((band.lower.values <= height) & (height <= band.upper.values))))
-    for name in widths:
-        numbers[f"posterior_{name}_width"] = float(np.mean(widths[name])) if widths[name] else math.nan
-        numbers[f"posterior_{name}_coverage"] = float(np.mean(held[name])) if held[name] else math.nan
-    if measured:
-        numbers["posterior_failed"] = failed / len(measured)
-    return numbers
+    numbers = {f"posterior_{name}_width": _mean(of) for name, of in widths.items()}
+    numbers |= {f"posterior_{name}_coverage": _mean(of) for name, of in held.items()}
+    return {**numbers, "posterior_failed": _mean(failed)}
+
+
+def _mean(values: Floats | Flags | Sequence[float]) -> float:
+    """Return the mean of values; NaN if there are none."""
+    return float(np.mean(values)) if np.size(values) else math.nan

@@ -40,17 +40,12 @@ from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee")
 
-_OF_METHODS = ("rms_along", "rms_across", "first_order_along", "first_order_across", "median_error")
-_SHARES_OF_METHODS = ("without_answer", "ok")
-_LENGTHS = (
-    "gap_width",
-    "expected_touched_width",
-    "expected_gap_width",
-    "posterior_touched_width",
-    "posterior_gap_width",
-)
 # Axes of the map beside the contours, with their usual values.
 _AXES = {"distance": (0.5,), "noise_factor": (0.1, 0.3, 1.0, 3.0)}
+# Lengths and shares in a cell, those of each reconstruction and the others.
+_LENGTHS_OF_METHODS = ("rms_along", "rms_across", "first_order_along", "first_order_across", "median_error")
+_SHARES_OF_METHODS = ("without_answer", "ok")
+_LENGTHS = ("gap_width", *(f"{of}_{kind}_width" for of in ("expected", "posterior") for kind in ("touched", "gap")))
 _SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_failed")
 
 
@@ -171,29 +166,19 @@ def error_map(
     rod = rig.rod or Rod()
     objects = _objects(contours, rod)
     distances, noise_factors = _axes(over)
-    check_whole_number("replicates", replicates, 1)
+    replicates = check_whole_number("replicates", replicates, 1)
     check_kind("bands", bands, Bands, "give Bands(probability=..., posterior_cells=...)")
     if not isinstance(drive, Rotation) or drive.base[1] != 0.0:
         raise refused("drive", drive, "give a Rotation((x, 0.0)), as the distance gives the height of the pivot")
-    cells = tuple(
-        MapCell(name, distance * rod.length, factor)
-        for name, distance, factor in product(objects, distances, noise_factors)
-    )
+    heights = [distance * rod.length for distance in distances]
+    cells = tuple(MapCell(*each) for each in product(objects, heights, noise_factors))
     plan, *_ = [Plan(each, rig, drive, bands.family) for each in objects.values()]
     chosen = np.unique(np.linspace(0, len(cells) - 1, min(bands.posterior_cells, len(cells))).round().astype(int))
-    task = MapTask(
-        objects,
-        cells,
-        plan,
-        drive,
-        int(replicates),
-        {int(number): min(bands.posterior_replicates, int(replicates)) for number in chosen},
-        bands.probability,
-        seed_sequence(rng),
-    )
+    posteriors = dict.fromkeys(chosen.tolist(), min(bands.posterior_replicates, replicates))
+    task = MapTask(objects, cells, plan, drive, replicates, posteriors, bands.probability, seed_sequence(rng))
     with open_results_store(_identity(task), out, CELLS) as store:
         kept = keep_outcomes(store, error_cell, task, len(cells), workers=workers)
-    return _labelled(task, kept, list(objects), distances, noise_factors)
+    return _labelled(task, kept, distances, noise_factors)
 
 
 def _axes(over: Mapping[str, Sequence[float]] | None) -> list[list[float]]:
@@ -243,41 +228,33 @@ def _identity(task: MapTask) -> dict[str, str]:
 
 
 def _labelled(
-    task: MapTask,
-    outcomes: Mapping[int, CellOutcome],
-    names: Sequence[str],
-    distances: Sequence[float],
-    factors: Sequence[float],
+    task: MapTask, outcomes: Mapping[int, CellOutcome], distances: Sequence[float], factors: Sequence[float]
 ) -> xr.Dataset:
     """Return the result of an error map; see `error_map`."""
-    shape = len(names), len(distances), len(factors)
-    dims = ("contour", "distance", "noise_factor")
-    si = not task.plan.rod.is_dimensionless
-    length = {"units": "m" if si else "1"}
+    rows = [outcomes[number] for number in range(len(task.cells))]
+    shape, dims = (len(task.contours), len(distances), len(factors)), ("contour", "distance", "noise_factor")
+    si, cell = not task.plan.rod.is_dimensionless, task.plan.cell
+    length, share = {"units": "m" if si else "1"}, {"units": "1"}
 
     def values(name: str) -> Any:
-        return np.array([outcomes[k].numbers.get(name, math.nan) for k in range(len(task.cells))]).reshape(shape)
+        return np.reshape([row.numbers.get(name, math.nan) for row in rows], shape)
 
-    variables: dict[str, Any] = {}
-    for name in (*_OF_METHODS, *_SHARES_OF_METHODS):
-        stacked = np.stack([values(f"{method}_{name}") for method in METHODS], axis=-1)
-        variables[name] = ((*dims, "reconstruction"), stacked, {"units": "1"} if name in _SHARES_OF_METHODS else length)
-    for name in _LENGTHS:
-        variables[name] = (dims, values(name), length)
-    for name in _SHARES:
-        variables[name] = (dims, values(name), {"units": "1"})
-    messages = np.array([outcomes[k].message for k in range(len(task.cells))]).reshape(shape)
-    cell = task.plan.cell
+    variables: dict[str, Any] = {"message": (dims, np.reshape([row.message for row in rows], shape))}
+    for names, unit in ((_LENGTHS, length), (_SHARES, share)):
+        variables |= {name: (dims, values(name), unit) for name in names}
+    for names, unit in ((_LENGTHS_OF_METHODS, length), (_SHARES_OF_METHODS, share)):
+        for name in names:
+            of_methods = np.stack([values(f"{method}_{name}") for method in METHODS], axis=-1)
+            variables[name] = ((*dims, "reconstruction"), of_methods, unit)
+    force, moment = np.multiply.outer([cell.force_noise, cell.moment_noise], factors)
     return xr.Dataset(
-        variables | {"message": (dims, messages)},
+        variables,
         coords={
-            "contour": list(names),
-            "distance": ("distance", np.asarray(distances, dtype=float), {"units": "rod lengths"}),
-            "noise_factor": np.asarray(factors, dtype=float),
-            **{
-                name: ("noise_factor", np.asarray(factors, dtype=float) * getattr(cell, name), {"units": unit})
-                for name, unit in (("force_noise", "N" if si else "EI/L²"), ("moment_noise", "N m" if si else "EI/L"))
-            },
+            "contour": list(task.contours),
+            "distance": ("distance", distances, {"units": "rod lengths"}),
+            "noise_factor": factors,
+            "force_noise": ("noise_factor", force, {"units": "N" if si else "EI/L²"}),
+            "moment_noise": ("noise_factor", moment, {"units": "N m" if si else "EI/L"}),
             "reconstruction": list(METHODS),
         },
         attrs={"replicates": task.replicates, "probability": task.probability, "seed": seed_words(task.seed)},

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -29,20 +31,22 @@ class Stretch(NamedTuple):
 
 def stretches(scan: Scan) -> list[Stretch]:
     """Return the intervals of x that the sweeps touch, and the gaps between them, in ascending order."""
-    arcs = sorted(sorted((sweep.first_contact.contact_x, sweep.snap_off.contact_x)) for sweep in scan.sweeps)
-    merged = [list(arcs[0])]
-    for begin, end in arcs[1:]:
-        if begin <= merged[-1][1]:
-            merged[-1][1] = max(merged[-1][1], end)
+    arcs = joined_arcs([sweep.first_contact.contact_x, sweep.snap_off.contact_x] for sweep in scan.sweeps)
+    found = [Stretch("touched", begin, end, np.linspace(begin, end, _GRID_POINTS)) for begin, end in arcs]
+    for (_, end), (onward, _) in pairwise(arcs):
+        found.append(Stretch("gap", end, onward, np.linspace(end, onward, _GRID_POINTS + 2)[1:-1]))
+    return sorted(found, key=lambda stretch: stretch.begin)
+
+
+def joined_arcs(arcs: Iterable[Sequence[float]]) -> list[list[float]]:
+    """Return the intervals that others, given by their two ends, cover together, in ascending order."""
+    joined: list[list[float]] = []
+    for begin, end in sorted(sorted(ends) for ends in arcs):
+        if joined and begin <= joined[-1][1]:
+            joined[-1][1] = max(joined[-1][1], end)
         else:
-            merged.append([begin, end])
-    found = []
-    for k, (begin, end) in enumerate(merged):
-        found.append(Stretch("touched", begin, end, np.linspace(begin, end, _GRID_POINTS)))
-        if k + 1 < len(merged):
-            onward = merged[k + 1][0]
-            found.append(Stretch("gap", end, onward, np.linspace(end, onward, _GRID_POINTS + 2)[1:-1]))
-    return found
+            joined.append([begin, end])
+    return joined
 
 
 def band_factor(probability: float) -> float:
@@ -50,18 +54,18 @@ def band_factor(probability: float) -> float:
     return 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
 
 
+def heights_of(model: ContourModel, points: Floats, x: Floats) -> Floats:
+    """Return the heights at x [length] of contours with parameters of shape (n, d), shape (n, x)."""
+    contours = model.contours(points).take(np.arange(len(points))[:, None])
+    return np.asarray(np.broadcast_to(contours.height(x), (len(points), x.size)))
+
+
 def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
     """Return the derivatives of the contour's heights at x [length] by all parameters, shape (x, d)."""
     own = len(model.family.parameters)
-
-    def heights(points: Floats) -> Floats:
-        contours = model.family.build(*points.T)
-        every = np.arange(len(points))[:, None]
-        return np.asarray(np.broadcast_to(contours.take(every).height(x), (len(points), x.size)))
-
     slopes = np.zeros((x.size, point.size))
     scale = np.maximum(np.abs(point[:own]), 1e-3 * model.likelihood.rod.length)
-    slopes[:, :own] = central_slopes(heights, point[:own], STEP * scale)
+    slopes[:, :own] = central_slopes(lambda points: heights_of(model, points, x), point[:own], STEP * scale)
     return slopes
 
 

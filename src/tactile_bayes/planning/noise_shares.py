@@ -14,7 +14,16 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, seed_words
-from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
+from tactile_bayes.planning.amplification import (
+    COLUMNS_OF_SAMPLES,
+    METHODS,
+    SOURCES,
+    Method,
+    along_and_across,
+    angles_within,
+    even_shares,
+    event_distances,
+)
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import COLUMNS, carried_sweeps, travel_unit, travels_of
@@ -37,8 +46,7 @@ def noise_shares(
     """
     if check_whole_number("samples", samples, 2, "give a power of two, like 1024") & (samples - 1):
         raise ParameterError(f"samples is {samples!r}: give a power of two, like 1024")
-    check_whole_number("states", states, 2)
-    chosen = _states(plan, int(states))
+    chosen = _states(plan, states)
     quiet = plan.certain(chosen)
     noises = {**plan.cell.standard_deviations, "drive_angle": plan.cell.drive_angle_deviation}
     sources = [name for name in SOURCES if noises[name] > 0.0]
@@ -67,20 +75,12 @@ def noise_shares(
     length = {"units": COLUMNS["base_x"].unit_in(quiet.attrs["units"])}
     along = {"units": travel_unit(quiet)}
     dims = ("reconstruction", "sample", "error")
-    columns = ("sweep", "direction", "drive_angle", "base_x", "base_y")
-    sweeps = plan.scan.sweeps
-    events = {
-        "after_first_contact": np.array([s.first_contact.travel for s in sweeps]),
-        "before_snap_off": np.array([s.snap_off.travel for s in sweeps]),
-    }
+    distances = event_distances(plan, chosen.sweep.values, chosen.travel.values)
     return xr.Dataset(
         {
-            **{name: ("sample", chosen[name].values, chosen[name].attrs) for name in columns},
+            **chosen[COLUMNS_OF_SAMPLES].data_vars,
             "contact_phase": ("sample", chosen.truth_contact_phase.values),
-            **{
-                name: ("sample", np.abs(chosen.travel.values - of[chosen.sweep.values]), along)
-                for name, of in events.items()
-            },
+            **{name: ("sample", far, along) for name, far in distances.items()},
             "share": ((*dims, "source"), first),
             "total_share": ((*dims, "source"), total),
             "rms_error": (dims, rms, length),
@@ -109,26 +109,19 @@ def _distribution(plan: Plan, source: str, deviation: float) -> Any:
 
 def _states(plan: Plan, count: int) -> xr.Dataset:
     """Return loaded samples at even distances between first contact and snap-off of every sweep."""
-    carried = sorted({*carried_sweeps(plan.scan.record), *turned_sweeps(plan.scan.record, plan.cell)})
-    if len(carried) == len(plan.scan.sweeps):
-        record = _with_travels(plan.scan.record)
-        loaded = [
-            np.flatnonzero((record.sweep.values == number) & (record.truth_contact_phase.values != "none"))
-            for number in carried
-        ]
-        even = (np.arange(count) + 0.5) / count
-        return record.isel(
-            sample=np.concatenate([rows[(even * rows.size).astype(int)] for rows in loaded if rows.size])
-        )
+    record, sweeps = plan.scan.record, range(len(plan.scan.sweeps))
+    carried = {*carried_sweeps(record), *turned_sweeps(record, plan.cell)}
+    if carried == set(sweeps):
+        is_loaded = record.truth_contact_phase.values != "none"
+        loaded = [np.flatnonzero(is_loaded & (record.sweep.values == number)) for number in sweeps]
+        rows = [own[(even_shares(count) * own.size).astype(int)] for own in loaded if own.size]
+        return _with_travels(record).isel(sample=np.concatenate(rows))
     if carried:
         raise ParameterError(
             "noise_shares takes rotations one way, or drives that carry the base or turn back, not both: plan them one "
             "by one, or leave noise_shares out of the parts"
         )
-    angles = []
-    for sweep in plan.scan.sweeps:
-        first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
-        angles.append(first + (snap - first) * (np.arange(count) + 0.5) / count)
+    angles = [angles_within(plan, number, even_shares(count)) for number in sweeps]
     record = _with_travels(plan.at_angles(np.concatenate(angles)).scan.record)
     near = np.array([np.isin(record.drive_angle.values[i], angles[s]) for i, s in enumerate(record.sweep.values)])
     return record.isel(sample=np.flatnonzero(near & (record.truth_contact_phase.values != "none")))
@@ -146,8 +139,6 @@ def _errors(quiet: xr.Dataset, plan: Plan, method: Method, noise: dict[str, Floa
     for name, drawn in noise.items():
         values[name] = ("sample", many[name].values + np.tile(drawn, samples), many[name].attrs)
     found = plan.reconstruct(many.assign(values), method)
-    slope = many.truth_slope_angle.values
     x, y = (found[name].values - many[f"truth_{name}"].values for name in ("contact_x", "contact_y"))
-    cos, sin = np.cos(slope), np.sin(slope)
-    both = np.stack([cos * x + sin * y, cos * y - sin * x])
+    both = np.stack(along_and_across(x, y, many.truth_slope_angle.values))
     return np.asarray(both.reshape(2, samples, draws).swapaxes(0, 1))

@@ -53,7 +53,7 @@ def reading_slopes(model: ContourModel, point: Floats, step: float = STEP) -> Re
             "or the length of the rod"
         )
     loads = model.loads(point[None])[0]
-    scale = np.where(cell.noise > 0.0, cell.noise, 1.0)
+    scale = _noise_or_one(cell)
 
     def readings(points: Floats) -> Floats:
         whole = np.hstack([points, np.broadcast_to(point[count:], (len(points), point.size - count))])
@@ -141,21 +141,19 @@ def parameter_scales(model: ContourModel, point: Floats) -> Floats:
 
 def _by_angle(model: ContourModel, point: Floats) -> Floats:
     """Return the derivatives of the readings by the drive angle, shape (samples, 3)."""
-    contours, rig = model.contours(point[None]), model.rig(point[None])
-    scale = model.likelihood.load_cell.noise
+    cell, scale = model.likelihood.load_cell, _noise_or_one(model.likelihood.load_cell)
 
     def readings(angles: Floats) -> Floats:
-        many = contours.take(np.zeros(len(angles), dtype=np.intp))
-        every = rig._replace(
-            **{
-                name: np.repeat(np.atleast_1d(value), len(angles), axis=0)
-                for name, value in rig._asdict().items()
-                if value is not None and name != "drive_angle_offset"
-            },
-            drive_angle_offset=np.asarray(rig.drive_angle_offset) - angles[:, 0],
-        )
-        loads, _ = model.likelihood.predict(many, every)
-        return np.asarray((model.likelihood.load_cell.expected(loads) / scale).reshape(len(angles), -1))
+        points = np.repeat(point[None], len(angles), axis=0)
+        rig = model.rig(points)
+        rig = rig._replace(drive_angle_offset=np.asarray(rig.drive_angle_offset) - angles[:, 0])
+        loads, _ = model.likelihood.predict(model.contours(points), rig)
+        return np.asarray((cell.expected(loads) / scale).reshape(len(angles), -1))
 
     slopes = central_slopes(readings, np.zeros(1), STEP)
     return np.asarray(slopes.reshape(-1, len(CHANNELS)) * scale)
+
+
+def _noise_or_one(cell: LoadCell) -> Floats:
+    """Return the scale of the readings of each channel, shape (3,): its noise, or 1 if it states none."""
+    return np.where(cell.noise > 0.0, cell.noise, 1.0)

@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -81,8 +82,7 @@ def required_noise(
     """
     check_kind("plan", plan, Plan, "give a Plan")
     check_probability("probability", probability)
-    several = band_width if np.iterable(band_width) else [band_width]
-    wanted = check_numbers("band_width", several, "give a positive length, or several", shape=(None,), least=TINY)
+    wanted = _lengths("band_width", band_width)
     width_at = _width_by_noise(plan, _grid_points(plan, where), probability)
     least, most = width_at(_LEAST), width_at(_MOST)
     if np.any(wanted <= least):
@@ -90,22 +90,20 @@ def required_noise(
             f"no noise gives a band of {wanted.min():g}: without any it would be {least:.3g} wide, by the unknowns "
             "of the rig; give tighter distributions, or state more of it as known"
         )
-    factors = [
-        math.inf
-        if width >= most
-        else math.exp(
-            brentq(lambda log, width=width: width_at(math.exp(log)) - width, math.log(_LEAST), math.log(_MOST))
-        )
-        for width in wanted
-    ]
-    si = plan.record.attrs["units"] != "dimensionless"
+
+    def factor_for(width: float) -> float:
+        if width >= most:
+            return math.inf
+        return math.exp(brentq(lambda log: width_at(math.exp(log)) - width, math.log(_LEAST), math.log(_MOST)))
+
+    factors = np.array([factor_for(width) for width in wanted])
+    si, cell = plan.record.attrs["units"] != "dimensionless", plan.cell
     unit = {"units": "m" if si else "1"}
-    cell = plan.cell
     return xr.Dataset(
         {
-            "noise_factor": ("band_width", np.array(factors)),
-            "force_noise": ("band_width", np.array(factors) * cell.force_noise, {"units": "N" if si else "EI/L²"}),
-            "moment_noise": ("band_width", np.array(factors) * cell.moment_noise, {"units": "N m" if si else "EI/L"}),
+            "noise_factor": ("band_width", factors),
+            "force_noise": ("band_width", factors * cell.force_noise, {"units": "N" if si else "EI/L²"}),
+            "moment_noise": ("band_width", factors * cell.moment_noise, {"units": "N m" if si else "EI/L"}),
             "present_width": ((), width_at(1.0), unit),
             "prior_width": ((), most, unit),
         },
@@ -174,42 +172,30 @@ def required_rod(
             "a rod is sought for a load cell in N and N m: give a plan of a rig with a rod in SI, and a load_cell"
         )
     x = _grid_points(plan, where)
-    dimensions = {
-        name: check_numbers(
-            f"{name}s",
-            values if np.iterable(values) else [values],
-            "give a list of positive numbers [m]",
-            shape=(None,),
-            least=TINY,
-        )
-        for name, values in (("length", lengths), ("diameter", diameters))
-    }
-    shape = (dimensions["length"].size, dimensions["diameter"].size)
-    width, strain = np.full(shape, np.nan), np.full(shape, np.nan)
-    status = np.full(shape, "", dtype="U16")
+    tried = {"length": _lengths("lengths", lengths), "diameter": _lengths("diameters", diameters)}
+    sizes = list(product(*(values.tolist() for values in tried.values())))
+    judged: list[tuple[float, float, str]] = []
     began = time.monotonic()
-    for done, (i, j) in enumerate(np.ndindex(shape), start=1):
-        rod = Rod.circular(
-            float(dimensions["length"][i]), float(dimensions["diameter"][j]), youngs_modulus, elastic_strain
-        )
+    for length, diameter in sizes:
+        rod = Rod.circular(length, diameter, youngs_modulus, elastic_strain)
         other = replace(plan, rig=replace(plan.rig, rod=rod))
-        width[i, j], strain[i, j], status[i, j] = _judged(other, elastic_strain, x, probability)
+        judged.append(_judged(other, elastic_strain, x, probability))
         if progress is not None:
-            progress(TaskProgress(done, width.size, done, time.monotonic() - began))
-    usable = np.where(status == "ok", width, np.inf)
-    best = np.unravel_index(int(np.argmin(usable)), shape)
-    found = bool(np.isfinite(usable[best]))
+            progress(TaskProgress(len(judged), len(sizes), len(judged), time.monotonic() - began))
+    usable = [width if status == "ok" else math.inf for width, _, status in judged]
+    best = int(np.argmin(usable))
+    best_of = (*sizes[best], usable[best]) if math.isfinite(usable[best]) else (math.nan,) * 3
     metres = {"units": "m"}
+    shape = [values.size for values in tried.values()]
+    width, strain, status = ((tuple(tried), np.reshape(of, shape)) for of in zip(*judged, strict=True))
     return xr.Dataset(
         {
-            "width": (("length", "diameter"), width, metres),
-            "strain": (("length", "diameter"), strain),
-            "status": (("length", "diameter"), status),
-            "best_length": ((), dimensions["length"][best[0]] if found else np.nan, metres),
-            "best_diameter": ((), dimensions["diameter"][best[1]] if found else np.nan, metres),
-            "best_width": ((), width[best] if found else np.nan, metres),
+            "width": (*width, metres),
+            "strain": strain,
+            "status": status,
+            **{f"best_{name}": ((), of, metres) for name, of in zip((*tried, "width"), best_of, strict=True)},
         },
-        coords={name: (name, values, metres) for name, values in dimensions.items()},
+        coords={name: (name, values, metres) for name, values in tried.items()},
         attrs={"where": where, "probability": probability, "elastic_strain": elastic_strain},
     )
 
@@ -231,6 +217,12 @@ def _judged(plan: Plan, elastic_strain: float, x: Floats, probability: float) ->
     arcs = stretches(plan.scan)
     touched = np.mean((x >= arcs[0].begin) & (x <= arcs[-1].end))
     return width, strain, "ok" if touched >= _LEAST_TOUCHED else "touches little"
+
+
+def _lengths(name: str, values: float | Sequence[float]) -> Floats:
+    """Return positive lengths, of which one may stand alone."""
+    several = values if np.iterable(values) else [values]
+    return check_numbers(name, several, "give a positive length, or several", shape=(None,), least=TINY)
 
 
 def _grid_points(plan: Plan, where: Where) -> Floats:
