@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
@@ -17,12 +16,7 @@ from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
 from benchmarks.samplers import demonstration, started
-from benchmarks.shooting import (
-    contact_by_integration,
-    misfit_by_least_squares,
-    sweep_by_collocation,
-    sweep_by_shooting,
-)
+from benchmarks.shooting import contact_by_integration, misfit_by_least_squares, sweep_by_collocation, sweep_by_shooting
 from benchmarks.starting import starting
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.arrays import Floats
@@ -33,7 +27,6 @@ from tactile_bayes.inference.contact_posterior.draws import draw_contacts
 from tactile_bayes.inference.contact_posterior.posterior import density_of
 from tactile_bayes.inference.ensembles import sample
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.numerics.random_numbers import spawn
@@ -47,17 +40,11 @@ SLOPES = 0.54, 0.12  # from soon after first contact to just before snap-off
 TAPERED = tb.Rod(taper=0.5)
 ANGLES = np.radians(np.arange(180.0))
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+PARABOLAS = {"a": {"uniform": [0.3, 0.7]}, "q": {"uniform": [0.5, 0.7]}, "x_c": {"normal": [0.0, 0.05]}}
 SPECIFICATION: dict[str, Any] = {
     "records": 2_000,
     "seed": 1,
-    "contours": [
-        {
-            "family": "parabola",
-            "a": {"uniform": [0.3, 0.7]},
-            "q": {"uniform": [0.5, 0.7]},
-            "x_c": {"normal": [0.0, 0.05]},
-        }
-    ],
+    "contours": [{"family": "parabola", **PARABOLAS}],
     "scan": {"samples": 180},
     "load_cell": {"force_noise": 0.05, "moment_noise": 0.02},
 }
@@ -73,19 +60,9 @@ def main() -> None:
         likeliest, error_of_likeliest = constrained()
         of_records, rate = data_set()
         of_contour, draws = contour_posterior()
-        print_ratios(
-            [
-                *one,
-                *sweeps(by_hand=one[0].otherwise),
-                *two,
-                likeliest,
-                posteriors(),
-                of_contour,
-                of_records,
-                *starting(),
-            ]
-        )
-        print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}\n{draws}\n{other_rods()}")
+        of_sweeps = sweeps(by_hand=one[0].otherwise)
+        print_ratios([*one, *of_sweeps, *two, likeliest, posteriors(), of_contour, of_records, *starting()])
+        print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}\n{draws}")
         print("\nTime per item, for growing numbers of items:")
         print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
         print_growth("sample, reconstruct", (1_000, 10_000, 100_000, 1_000_000), reconstruct)
@@ -96,17 +73,18 @@ def step_one() -> tuple[list[Row], str]:
     """Time a state; 40 slope angles by hand."""
     slopes = np.linspace(*SLOPES, 40)
     exact = states(slopes)
-    first = tuple(exact[0])
-    shooting = best_time(lambda: sweep_by_shooting(CONTOUR, slopes, first), 3) / slopes.size
-    collocation = best_time(lambda: sweep_by_collocation(CONTOUR, slopes, first), 3) / slopes.size
-    ours = best_time(equilibria(MANY)) / MANY
-    apart = np.abs(sweep_by_shooting(CONTOUR, slopes, first, TIGHT) - exact).max()
-    first_of_tapered = tuple(states(slopes, TAPERED)[0])
-    tapered = (
-        best_time(lambda: sweep_by_collocation(CONTOUR, slopes, first_of_tapered, taper=TAPERED.taper), 3) / slopes.size
+    first, of_tapered = tuple(exact[0]), tuple(states(slopes, TAPERED)[0])
+    shooting, collocation, tapered = (
+        best_time(job, 3) / slopes.size
+        for job in (
+            lambda: sweep_by_shooting(CONTOUR, slopes, first),
+            lambda: sweep_by_collocation(CONTOUR, slopes, first),
+            lambda: sweep_by_collocation(CONTOUR, slopes, of_tapered, taper=TAPERED.taper),
+        )
     )
     few = MANY // 20
-    ours_of_tapered = best_time(equilibria(few, TAPERED)) / few
+    ours, ours_of_tapered = best_time(equilibria(MANY)) / MANY, best_time(equilibria(few, TAPERED)) / few
+    apart = np.abs(sweep_by_shooting(CONTOUR, slopes, first, TIGHT) - exact).max()
     return [
         Row("Step 1, a state: solve_ivp and root / equilibria", shooting, ours),
         Row("Step 1, a state: solve_bvp / equilibria", collocation, ours),
@@ -224,51 +202,19 @@ def sweeps(by_hand: float) -> list[Row]:
     likelihood = RecordLikelihood(measured, CELL)
     walkers = contours(64)
     rows = [
-        (f"double scan at 1° and its events, {scanned} states", scanned, lambda: tb.scan(CONTOUR), 1),
-        (f"sweep at 1° along one of 1000 contours, {touching:.0f} states", touching, observed, 1_000),
+        ("double scan at 1° and its events", scanned, lambda: tb.scan(CONTOUR), 1),
+        ("sweep at 1° along one of 1000 contours", touching, observed, 1_000),
         (
-            f"log-likelihood of a double sweep for one of 64 contours, {in_contact(measured)} states",
+            "log-likelihood of a double sweep for one of 64 contours",
             in_contact(measured),
             lambda: likelihood.log_likelihood(walkers),
             64,
         ),
     ]
-    return [Row(f"{what}: solve_ivp and root / ours", n * by_hand, best_time(job) / of) for what, n, job, of in rows]
-
-
-_STEP_OF_TRAVEL = 0.015  # step at which drives that carry the base have as many samples as rotations [L]
-CARRIED = {
-    "carried along a line": [
-        tb.Translation((0.9, 0.0), np.pi, 1.0, 1.8),
-        tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8),
-    ],
-    "carried and turned": [tb.Motion([0.9, -0.9], 0.0, [0.7, 1.9]), tb.Motion([-0.9, 0.9], 0.0, [2.44, 1.24])],
-}
-
-
-def other_rods() -> str:
-    """Time log-likelihoods of other rods than a straight one that is turned, and of other drives, once compiled."""
-    rng, walkers = np.random.default_rng(1), contours(64)
-    sampled = RigValues(taper=rng.normal(0.0, 0.05, 64), friction=abs(rng.normal(0.0, 0.2, 64)))
-    rods = {
-        "straight": (tb.Rod(), None),
-        "arc": (tb.Rod(rest_curvature=0.5), None),
-        "curved by a function": (tb.Rod(rest_curvature=lambda s: 0.6 * s), None),
-        "tapered by half": (tb.Rod(taper=0.5), None),
-        "taper and friction sampled": (tb.Rod(taper=0.5), sampled),
-    }
-    times = {}
-    for name, (rod, rig) in rods.items():
-        measured = CELL.measure(tb.scan(CONTOUR, tb.Rig(rod=rod), drive_angles=ANGLES).record, rng=1)
-        likelihood = RecordLikelihood(measured, CELL)
-        times[name] = best_time(lambda of=likelihood, rig=rig: of.log_likelihood(walkers, rig=rig), 50) / 64
-    for name, drive in CARRIED.items():
-        measured = CELL.measure(tb.scan(CONTOUR, drive=replace(drive, drive_step=_STEP_OF_TRAVEL)).record, rng=1)
-        likelihood = RecordLikelihood(measured, CELL)
-        times[name] = best_time(lambda of=likelihood: of.log_likelihood(walkers), 50) / 64
-    straight = times.pop("straight")
-    others = ", ".join(f"{name} {taken / straight:.2f}" for name, taken in times.items())
-    return f"Log-likelihood of a double sweep, straight rod: {straight * 1e6:.0f} µs; times as long: {others}"
+    return [
+        Row(f"{what}, {n:.0f} states: solve_ivp and root / ours", n * by_hand, best_time(job) / of)
+        for what, n, job, of in rows
+    ]
 
 
 def data_set() -> tuple[Row, str]:
@@ -280,10 +226,9 @@ def data_set() -> tuple[Row, str]:
         ours = best_time(lambda: tb.datasets.generate(SPECIFICATION, mkdtemp(dir=folder), workers=1), 3) / records
     touched = int(np.count_nonzero(made.truth_contact_phase != 0)) / 4
     by_hand = touched * float(np.mean([time_by_hand(made.isel(record=k, sweep=0)) for k in range(4)]))
-    what = (
-        f"record of {made.sizes['sweep']} × {made.sizes['sample']} samples in a data set on disk, {touched:.0f} states"
-    )
-    return Row(f"{what}: solve_ivp and root / generate", by_hand, ours), (
+    samples = f"{made.sizes['sweep']} × {made.sizes['sample']} samples"
+    what = f"record of {samples} in a data set on disk, {touched:.0f} states: solve_ivp and root / generate"
+    return Row(what, by_hand, ours), (
         f"Data set: {records:,} double sweeps along as many contours, truth and readings, {1.0 / ours:,.0f} records/s"
     )
 

@@ -96,12 +96,16 @@ def conditions(family: str, noise: str) -> dict[str, Any]:
 
 def published(families: Iterable[str], noise: str) -> dict[str, xr.Dataset]:
     """Return the calibrations whose replicates are published, by family."""
-    found = {}
-    for family in families:
-        if _path(family, noise).exists():
-            outcomes = {number: _outcome(row) for number, row in enumerate(_rows(family, noise))}
-            found[family] = summary(experiment_of(**conditions(family, noise)), outcomes)
-    return found
+    return {
+        family: judged(family, noise, map(_outcome, _rows(family, noise)))
+        for family in families
+        if _path(family, noise).exists()
+    }
+
+
+def judged(family: str, noise: str, outcomes: Iterable[Outcome]) -> xr.Dataset:
+    experiment = experiment_of(**conditions(family, noise))
+    return summary(experiment.identity, experiment.probability, dict(enumerate(outcomes)))
 
 
 def _path(family: str, noise: str) -> Path:
@@ -121,12 +125,12 @@ def _outcome(row: dict[str, str]) -> Outcome:
 
 def pooled(family: str, noise: str, each: Iterable[xr.Dataset]) -> xr.Dataset:
     """Return one calibration of replicates that were made one by one, each with a rig of its own."""
-    outcomes = {}
-    for number, one in enumerate(each):
-        of_one, names = one.isel(replicate=0), [name for name in NUMBERS if name in one]
-        ranks = {str(name): int(rank) for name, rank in zip(one.quantity.values, of_one["ranks"].values, strict=True)}
-        outcomes[number] = Outcome(ranks, {name: float(of_one[name]) for name in names}, str(of_one.message.values))
-    return summary(experiment_of(**conditions(family, noise)), outcomes)
+    outcomes = []
+    for one in (several.isel(replicate=0) for several in each):
+        ranks = {str(name): int(rank) for name, rank in zip(one.quantity.values, one["ranks"].values, strict=True)}
+        numbers = {name: float(one[name]) for name in NUMBERS if name in one}
+        outcomes.append(Outcome(ranks, numbers, str(one.message.values)))
+    return judged(family, noise, outcomes)
 
 
 def publish(family: str, noise: str, made: xr.Dataset) -> None:

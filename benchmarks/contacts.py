@@ -14,8 +14,10 @@ from scipy.stats import binom
 from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
+from benchmarks.table import line
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw
+from tactile_bayes.planning.amplification import along_and_across
 from tactile_bayes.rig import make_record
 from tactile_bayes.tasks import one_thread
 
@@ -45,8 +47,8 @@ def main(sweeps: int = 1000) -> None:
 
 def print_errors() -> None:
     """Print errors, raw and constrained, along and across the contour, by phase and noise."""
-    print(f"{'noise of force [EI/L²]':<24}{'phase':<12}{'contacts':>9}{'raw: no answer':>16}{'both ok':>9}", end="")
-    print(f"{'raw: along':>12}{'across':>9}{'constrained: along':>20}{'across':>9}")
+    heads = ("contacts", "no answer", "both ok", "raw: along", "across", "constrained: along", "across")
+    print(line(f"{'noise of force [EI/L²]':<24}phase", heads, 36, 20))
     data = tb.datasets.open(REFERENCE)
     rows: dict[tuple[float, str], list[Floats]] = {}
     for index in range(data.sizes["record"]):
@@ -55,7 +57,7 @@ def print_errors() -> None:
         length = float(record.attrs["rod_length"])
         raw, constrained = (tb.reconstruct(record, method=method) for method in METHODS)
         loaded = raw.status.values != "no contact"
-        off = np.stack([*errors(raw, record), *errors(constrained, record)]) / length
+        off = np.stack([error for each in (raw, constrained) for error in errors(each, record)]) / length
         answered = np.isin(raw.status.values, ("ok", "nonlinear"))
         ok = (raw.status.values == "ok") & (constrained.status.values == "ok")
         for phase in PHASES:
@@ -63,17 +65,15 @@ def print_errors() -> None:
             rows.setdefault((noise, phase), []).append(np.vstack([answered, ok, off])[:, chosen])
     for (noise, phase), parts in sorted(rows.items()):
         answered, ok, *off = np.concatenate(parts, axis=1)
-        along, across, our_along, our_across = (np.sqrt(np.mean(error[ok == 1.0] ** 2)) for error in off)
-        print(f"{noise:<24.3g}{phase:<12}{answered.size:>9,}{1.0 - answered.mean():>16.1%}{ok.mean():>9.1%}", end="")
-        print(f"{along:>12.4f}{across:>9.4f}{our_along:>20.4f}{our_across:>9.4f}")
+        cells = [f"{answered.size:,}", f"{1.0 - answered.mean():.1%}", f"{ok.mean():.1%}"]
+        cells += [f"{np.sqrt(np.mean(error[ok == 1.0] ** 2)):.4f}" for error in off]
+        print(line(f"{noise:<24.3g}{phase}", cells, 36, 20))
 
 
 def errors(contacts: xr.Dataset, record: xr.Dataset) -> tuple[Floats, Floats]:
     """Return errors along the true contour and across it."""
-    x = contacts.contact_x.values - record.truth_contact_x.values
-    y = contacts.contact_y.values - record.truth_contact_y.values
-    slope = record.truth_slope_angle.values
-    return x * np.cos(slope) + y * np.sin(slope), y * np.cos(slope) - x * np.sin(slope)
+    x, y = (contacts[name].values - record[f"truth_{name}"].values for name in ("contact_x", "contact_y"))
+    return along_and_across(x, y, record.truth_slope_angle.values)
 
 
 # ---- how often covered
@@ -82,19 +82,20 @@ def errors(contacts: xr.Dataset, record: xr.Dataset) -> tuple[Floats, Floats]:
 def print_coverage(sweeps: int, seed: int = 1) -> None:
     """Print coverage by phase and part of the sweep; in brackets, that of exact regions in 95 of 100 studies."""
     found = coverage(sweeps, seed)
-    print(f"{'':<39}{'contacts':>9}{'status ok':>14}" + "".join(f"{f'{p:.0%}':>23}" for p in PROBABILITIES))
+    print(line("", ("contacts", "status ok", *(f"{p:.0%}" for p in PROBABILITIES)), 39, 23))
     for name in (*METHODS, "posterior"):
         print(name)
         for phase in PHASES:
             for place in PLACES:
                 chosen = (found["phase"] == phase) & (found["place"] == place)
                 ok = chosen & found[f"{name} ok"].astype(bool)
-                cells = [f"{np.count_nonzero(chosen):>9,}{ok.sum() / max(chosen.sum(), 1):>14.1%}"]
+                count = max(ok.sum(), 1)
+                cells = [f"{np.count_nonzero(chosen):,}", f"{ok.sum() / max(chosen.sum(), 1):.1%}"]
                 for p in PROBABILITIES:
                     share = float(np.mean(found[name][ok] <= p)) if ok.any() else np.nan
-                    low, high = (float(q) / max(ok.sum(), 1) for q in binom(ok.sum(), p).interval(0.95))
-                    cells.append(f"{share:.3f} [{low:.3f}, {high:.3f}]".rjust(23))
-                print(f"  {f'{phase}, {place}':<37}" + "".join(cells))
+                    low, high = (float(q) / count for q in binom(ok.sum(), p).interval(0.95))
+                    cells.append(f"{share:.3f} [{low:.3f}, {high:.3f}]")
+                print(line(f"  {phase}, {place}", cells, 39, 23))
 
 
 def coverage(sweeps: int, seed: int) -> dict[str, NDArray[np.generic]]:
@@ -118,8 +119,6 @@ def coverage(sweeps: int, seed: int) -> dict[str, NDArray[np.generic]]:
         of_sweep = np.repeat(list(PLACES), [SAMPLES[place] for place in PLACES])
         held["place"] = np.tile(of_sweep, measured.sizes["sample"] // of_sweep.size)
         parts.append({name: values[loaded] for name, values in held.items()})
-        if sys.stderr.isatty():
-            print(f"\r{number + 1} of {-(-sweeps // 50)}", end="", file=sys.stderr)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

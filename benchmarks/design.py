@@ -15,54 +15,39 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
+from benchmarks.table import results
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import usual_load_cell
 from tactile_bayes.planning.candidate import measured_of
 from tactile_bayes.planning.knowledge import known_from_prior
-from tactile_bayes.tasks import run_tasks
 
 FAMILY = tb.Family("parabola", a=stats.lognorm(s=0.4, scale=0.6), q=stats.uniform(0.35, 0.3), x_c=stats.norm(0.0, 0.1))
 STEP = float(np.radians(2.0))
-ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), (-0.1, 0.0, 0.1)
 SETTINGS = SamplerSettings(ensembles=2, walkers=32, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 PLACES = 25
 
 
 class Outcome(NamedTuple):
-    """Mean widths of bands over the span of the first base's sweeps, with the gap."""
+    """Mean widths of bands over the span of the first base's sweeps, with the gap; or arrays of them."""
 
     first: float
     again: float  # from the same base once more
     naive: float
     chosen: float
     foreseen: float  # prediction by `design` for the chosen base
-    base: tuple[float, float]
-    naive_base: tuple[float, float]
-    message: str
 
 
 def main(objects: int = 100) -> None:
-    rows = []
-    for _, outcome in run_tasks(compared, list(range(objects))):
-        rows.append(outcome)
-        if sys.stderr.isatty():
-            print(f"\r{len(rows)} of {objects}", end="", file=sys.stderr)
-    report(rows)
-
-
-def report(rows: list[Outcome]) -> None:
-    done = [row for row in rows if not row.message]
-    print(f"{len(done)} objects; {len(rows) - len(done)} could not be inferred or reached from a base")
+    done = [outcome for _, outcome in results(compared, range(objects)) if outcome is not None]
+    print(f"{len(done)} objects; {objects - len(done)} could not be inferred or reached from a base")
+    width = Outcome(*np.array(done).T)
     for name in ("again", "naive", "chosen"):
-        ratio = np.array([getattr(row, name) / row.first for row in done])
-        print(f"band, {name + ' over that of the first base alone':<42}{_spread(ratio)}")
-    ratio = np.array([row.naive / row.chosen for row in done])
+        print(f"band, {name + ' over that of the first base alone':<42}{_spread(getattr(width, name) / width.first)}")
+    ratio = width.naive / width.chosen
     print(f"band, {'naive over chosen':<42}{_spread(ratio)}; chosen is narrower in {np.mean(ratio > 1.0):.0%}")
-    print(
-        f"band, {'chosen over what was foreseen':<42}{_spread(np.array([row.chosen / row.foreseen for row in done]))}"
-    )
+    print(f"band, {'chosen over what was foreseen':<42}{_spread(width.chosen / width.foreseen)}")
 
 
 def _spread(ratio: Floats) -> str:
@@ -72,19 +57,19 @@ def _spread(ratio: Floats) -> str:
     return f"{np.exp(logs.mean()):6.3f} ± {error:.1%} (geometric mean), 10 to 90 %: {low:.2f} to {high:.2f}"
 
 
-def compared(number: int) -> Outcome:
+def compared(number: int) -> Outcome | None:
+    """Return the widths for one object; None if it could not be inferred or reached."""
     rng = np.random.default_rng([2031, number])
     known = known_from_prior(tb.Rig(unknown={"friction": 0.0}), FAMILY, draws=1, rng=rng)
     point = known.points[0]
-    nan = float("nan")
     try:
         first = measured_of(known.model_from([tb.Rotation()], STEP), point, rng)
         posterior = _inferred(first, number)
         gap = tb.gap(posterior)
         x = np.linspace(*_span(posterior), PLACES)
-        candidates = [tb.Rotation((across, above), drive_step=STEP) for above in ABOVE for across in ACROSS]
+        drives = tb.planning.usual_drives(posterior, drive_step=STEP)
         criterion = tb.planning.Criterion(span=(x[0], x[-1]))
-        planned = tb.design(posterior, drives=candidates, criterion=criterion, rng=number, draws=8)
+        planned = tb.design(posterior, drives=drives, criterion=criterion, rng=number, draws=8)
         reached = planned.isel(candidate=np.flatnonzero(planned.reached.values == 1.0))
         best = reached.isel(candidate=int(np.argmin(reached.width.values)))
         bases = {
@@ -98,10 +83,9 @@ def compared(number: int) -> Outcome:
             second = measured_of(model, point, np.random.default_rng([2032, number]))
             both = xr.concat([first, second.assign(sweep=second.sweep + 2)], "sample", combine_attrs="override")
             widths[name] = _width(_inferred(both, number), x)
-    except TactileBayesError as error:
-        return Outcome(nan, nan, nan, nan, nan, (nan, nan), (nan, nan), f"{type(error).__name__}: {error}")
-    foreseen = float(best.width)
-    return Outcome(**widths, foreseen=foreseen, base=bases["chosen"], naive_base=bases["naive"], message="")
+    except TactileBayesError:
+        return None
+    return Outcome(**widths, foreseen=float(best.width))
 
 
 def _inferred(record: xr.Dataset, seed: int) -> xr.DataTree:

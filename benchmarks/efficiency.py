@@ -12,9 +12,9 @@ import sys
 import numpy as np
 
 import tactile_bayes as tb
+from benchmarks.table import line, results
 from tactile_bayes.arrays import Floats
 from tactile_bayes.planning.information import information
-from tactile_bayes.tasks import run_tasks
 
 FACTORS = (3.0, 1.0, 0.1, 0.01)  # factors on a noise of 0.05 EI/L² and 0.02 EI/L
 DRAWS = 2500.0
@@ -27,12 +27,11 @@ PLAN = tb.planning.Plan(
 
 def main(records: int = 8) -> None:
     found: dict[float, list[Floats]] = {factor: [] for factor in FACTORS}
-    for (factor, _), ratios in run_tasks(compared, [(factor, seed) for factor in FACTORS for seed in range(records)]):
+    for (factor, _), ratios in results(compared, [(factor, seed) for factor in FACTORS for seed in range(records)]):
         found[factor].append(ratios)
-    print(f"{'noise, over the usual':<24}" + "".join(f"{factor:>16g}" for factor in FACTORS))
+    print(line("noise, over the usual", (f"{factor:g}" for factor in FACTORS), 24, 16))
     for k, name in enumerate(PLAN.model.names):
-        cells = [_mean(np.array(found[factor])[:, k]) for factor in FACTORS]
-        print(f"{name:<24}" + "".join(f"{cell:>16}" for cell in cells))
+        print(line(name, (_mean(np.array(found[factor])[:, k]) for factor in FACTORS), 24, 16))
     print(f"Means of {records} records; of one, sampling alone makes {1.0 / np.sqrt(2.0 * DRAWS):.1%}.")
 
 

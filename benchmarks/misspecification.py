@@ -25,6 +25,7 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
+from benchmarks.table import counts_and_names, folder_name, line
 from tactile_bayes.rig import NOTHING
 
 OUT = Path("results/misspecification")
@@ -36,6 +37,8 @@ FEWER = 4  # factor by which replicates of shape-free contours are fewer, as the
 CHANCE, SCORE = 1e-3, 4.0  # probability of the misfit, and size of the axial score, that raise an alarm
 
 
+Truth = tb.Rig | tb.calibration.Misspecification
+
 INFERRED = tb.Rig(load_cell=CELL)
 AS_STATED = tb.Rig(load_cell=CELL, unknown="nothing")
 
@@ -43,7 +46,7 @@ AS_STATED = tb.Rig(load_cell=CELL, unknown="nothing")
 class Run(NamedTuple):
     """The truth that is simulated, the rig that inference assumes, and other options of `calibrate`."""
 
-    truth: tb.Rig | tb.calibration.Misspecification
+    truth: Truth
     rig: tb.Rig = INFERRED
     options: Mapping[str, Any] = MappingProxyType({})
 
@@ -58,16 +61,10 @@ def _known_to_vary(**known: float) -> dict[str, Run]:
     return {"": Run(_real(**known)), "as stated": Run(_real(**{**NOTHING, **known}), AS_STATED)}
 
 
-def _untold(
-    truth: tb.Rig | tb.calibration.Misspecification,
-    *,
-    options: Mapping[str, Any] = MappingProxyType({}),
-    **rigs: tb.Rig,
-) -> dict[str, Run]:
+def _untold(truth: Truth, *, options: Mapping[str, Any] = MappingProxyType({}), **rigs: tb.Rig) -> dict[str, Run]:
     """Return runs with properties that are not inferred by default, and with these inferred or stated."""
-    return {"": Run(truth, options=options)} | {
-        other.replace("_", " "): Run(truth, rig, options) for other, rig in rigs.items()
-    }
+    corrected = {other.replace("_", " "): Run(truth, rig, options) for other, rig in rigs.items()}
+    return {"": Run(truth, options=options), **corrected}
 
 
 def _spotted(at: float) -> dict[str, Run]:
@@ -110,16 +107,15 @@ CASES: Mapping[str, Mapping[str, Run]] = {
 }
 
 
+_HEAD = """noise 0.05 EI/L² and 0.02 EI/L, steps of 2°; bands of 90 %; noticed by the check of
+the record, by the misfit of single samples, by the axial score, by any of them; not converged, or lost: of a
+replicate that ended with an error nothing holds, and nothing is noticed"""
+
+
 def main(replicates: int = 40, *names: str, discrepancy: bool = False) -> None:
-    print(
-        f"{replicates} replicates; noise 0.05 EI/L² and 0.02 EI/L, steps of 2°; bands of 90 %; noticed by the check of"
-    )
-    print(
-        "the record, by the misfit of single samples, by the axial score, by any of them; not converged, or lost: of a"
-    )
-    print("replicate that ended with an error nothing holds, and nothing is noticed\n")
+    print(f"{replicates} replicates; {_HEAD}\n")
     heads = ("in the gap", "beside it", "bias [L]", "width [L]", "check", "misfit", "axial", "any", "not conv.")
-    print(f"{'':<38}" + "".join(f"{head:>11}" for head in heads), flush=True)
+    print(line("", heads, 38), flush=True)
     for name in names or CASES:
         runs = beside_discrepancy(CASES[name]) if discrepancy else CASES[name]
         for k, (other, run) in enumerate(runs.items()):
@@ -138,10 +134,9 @@ def beside_discrepancy(runs: Mapping[str, Run]) -> dict[str, Run]:
 
 
 def calibrated(name: str, run: Run, replicates: int) -> xr.Dataset:
-    folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in name.strip())
     settings = None if run.options.get("family") == "shape-free" else SETTINGS
     options = {"rig": run.rig, "truth": run.truth, "settings": settings, **run.options}
-    return tb.calibrate(rng=2029, replicates=replicates, out=folder, **options)
+    return tb.calibrate(rng=2029, replicates=replicates, out=OUT / folder_name(name), **options)
 
 
 def row(name: str, found: xr.Dataset) -> str:
@@ -150,13 +145,10 @@ def row(name: str, found: xr.Dataset) -> str:
     check = found.check_passed.values == 0.0
     misfit = found.misfit_probability.values < CHANCE
     axial = np.abs(found.axial_score.values) > SCORE
-    held = [_mean(found, f"pointwise_{region}") for region in ("in_gap", "beside")]
-    lengths = [_mean(found, f"{what}_in_gap") for what in ("bias", "width")]
-    cells = [f"{v:.2f}" for v in held] + [f"{v:.4f}" for v in lengths]
-    cells += [f"{check.mean():.0%}"]
-    cells += [f"{alarm.mean():.0%}" for alarm in (misfit, axial, check | misfit | axial)]
-    cells += [f"{np.mean(found.converged.values != 1.0):.0%}"]
-    return f"{name:<38}" + "".join(f"{cell:>11}" for cell in cells)
+    cells = [f"{_mean(found, f'pointwise_{region}'):.2f}" for region in ("in_gap", "beside")]
+    cells += [f"{_mean(found, f'{what}_in_gap'):.4f}" for what in ("bias", "width")]
+    shares = (check, misfit, axial, check | misfit | axial, found.converged.values != 1.0)
+    return line(name, [*cells, *(f"{share.mean():.0%}" for share in shares)], 38)
 
 
 def _mean(found: xr.Dataset, name: str) -> float:
@@ -165,6 +157,5 @@ def _mean(found: xr.Dataset, name: str) -> float:
 
 
 if __name__ == "__main__":
-    given = [argument for argument in sys.argv[1:] if argument != "--discrepancy"]
-    counts, chosen = [a for a in given if a.isdigit()], [a for a in given if not a.isdigit()]
-    main(*map(int, counts or ["40"]), *chosen, discrepancy="--discrepancy" in sys.argv)
+    counts, chosen = counts_and_names(sys.argv[1:])
+    main(*(counts or [40]), *chosen, discrepancy="--discrepancy" in sys.argv)

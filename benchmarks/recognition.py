@@ -10,20 +10,20 @@ from __future__ import annotations
 import itertools
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
 
 import tactile_bayes as tb
+from benchmarks.table import line, results
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Circle, Contour, Joined
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.priors import matched_priors
 from tactile_bayes.rig import NOTHING
-from tactile_bayes.tasks import run_tasks
 
 FAMILIES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 NONE = "edge"  # two arcs that meet at an angle
@@ -45,53 +45,37 @@ class Outcome(NamedTuple):
 
 
 def main(objects: int = 200, workers: int = 2) -> None:
-    outcomes = []
-    for (kind, noise, _), outcome in run_tasks(recognised, tasks(objects), workers=workers):
-        outcomes.append((kind, noise, outcome))
-        if sys.stderr.isatty():
-            print(f"\r{len(outcomes)} of {objects}", end="", file=sys.stderr)
-    report(outcomes)
-
-
-def tasks(objects: int) -> list[tuple[str, str, int]]:
-    """Return tasks, kinds and noises in turn."""
-    return [(KINDS[k // 2 % len(KINDS)], list(NOISES)[k % 2], k) for k in range(objects)]
-
-
-def report(found: Sequence[tuple[str, str, Outcome]]) -> None:
+    tasks = [(KINDS[k // 2 % len(KINDS)], list(NOISES)[k % 2], k) for k in range(objects)]
     outcomes: dict[tuple[str, str], list[Outcome]] = {(kind, noise): [] for noise in NOISES for kind in KINDS}
-    for kind, noise, outcome in found:
+    for (kind, noise, _), outcome in results(recognised, tasks, workers):
         outcomes[kind, noise].append(outcome)
     for noise in NOISES:
         print(
             f"\n{noise}: rows what it was, columns the most probable, or that none fits; then mean of its probability"
         )
-        print(f"{'':<22}" + "".join(f"{head:>21}" for head in (*FAMILIES, "none fits", "no answer", "mean time")))
+        print(line("", (*FAMILIES, "none fits", "no answer", "mean time"), 22, 21))
         for kind in KINDS:
-            print(f"{kind:<22}" + "".join(f"{cell:>21}" for cell in _row(kind, outcomes[kind, noise])))
+            print(line(kind, _row(kind, outcomes[kind, noise]), 22, 21))
+    print_calibration({kind: outcomes[kind, "quiet"] + outcomes[kind, "strong"] for kind in FAMILIES})
+
+
+def print_calibration(outcomes: Mapping[str, list[Outcome]]) -> None:
     print("\nProbability stated, how often, and how often it was this family:")
-    stated, true = [], []
-    for (kind, _), of_kind in outcomes.items():
-        if kind == NONE:
-            continue
-        for outcome in of_kind:
-            if np.isfinite(outcome.probability).all():
-                stated.append(outcome.probability)
-                true.append(np.arange(len(FAMILIES)) == FAMILIES.index(kind))
-    values, is_true = np.concatenate(stated), np.concatenate(true)
+    known = [(k, o.probability) for k, of in outcomes.items() for o in of if np.isfinite(o.probability).all()]
+    values = np.concatenate([probability for _, probability in known])
+    is_true = np.concatenate([np.array(FAMILIES) == kind for kind, _ in known])
     for low, high in itertools.pairwise(BINS):
         inside = (values >= low) & ((values < high) | (high == 1.0))
         if inside.any():
             said, was, count = values[inside].mean(), is_true[inside].mean(), int(inside.sum())
-            print(
-                f"{low:>5.2f} to {high:.2f}{count:>6}   stated {said:.3f}   true {was:.3f} ± {_error(said, count):.3f}"
-            )
+            error = np.sqrt(said * (1.0 - said) / count)
+            print(f"{low:>5.2f} to {high:.2f}{count:>6}   stated {said:.3f}   true {was:.3f} ± {error:.3f}")
     score = np.log(np.maximum(values[is_true], 1e-300))
     print(f"mean log-probability of the truth {score.mean():.3f} (of guesses {-np.log(len(FAMILIES)):.3f})")
 
 
 def _row(kind: str, of_kind: list[Outcome]) -> list[str]:
-    counts, means = np.zeros(len(FAMILIES) + 2, dtype=int), []
+    counts = np.zeros(len(FAMILIES) + 2, dtype=int)
     for outcome in of_kind:
         if not outcome.fits.any():
             counts[-2] += 1
@@ -99,17 +83,11 @@ def _row(kind: str, of_kind: list[Outcome]) -> list[str]:
             counts[-1] += 1
         else:
             counts[int(np.argmax(outcome.probability))] += 1
-        if kind in FAMILIES:
-            means.append(outcome.probability[FAMILIES.index(kind)])
-    mean = f" ({np.nanmean(means):.2f})" if means else ""
     cells = [str(count) if count else "·" for count in counts]
-    if kind in FAMILIES:
-        cells[FAMILIES.index(kind)] += mean
+    if kind in FAMILIES and of_kind:
+        own = FAMILIES.index(kind)
+        cells[own] += f" ({np.nanmean([outcome.probability[own] for outcome in of_kind]):.2f})"
     return [*cells, f"{np.mean([o.seconds for o in of_kind]) if of_kind else 0.0:.1f} s"]
-
-
-def _error(share: float, count: int) -> float:
-    return float(np.sqrt(share * (1.0 - share) / count))
 
 
 def recognised(task: tuple[str, str, int]) -> Outcome:

@@ -25,6 +25,7 @@ from arviz_stats.base.array import array_stats
 from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
+from benchmarks.table import line
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import sample
@@ -62,7 +63,7 @@ def main(evaluations: int = 40_000) -> None:
         start = started(walk)
         model.log_probability(start[0])  # whatever is compiled is compiled here
         print(f"{', '.join(model.names)}: {RUNS} runs of {evaluations // RUNS:,} evaluations\n")
-        print(f"{'':<54}{'evaluations':>12}{'CPU':>9}{'R̂':>8}{'ESS':>8}{'ESS/s':>8}{'ESS/1000':>10}{'means off':>11}")
+        print(line("", ("evaluations", "CPU", "R̂", "ESS", "ESS/s", "ESS/1000", "means off"), 54, 12))
         reference = None
         for name, package, sampler in samplers(walk):
             if not installed(package):
@@ -105,8 +106,8 @@ def print_row(name: str, evaluations: int, seconds: float, chains: Floats, refer
     r_hat = max(array_stats.rhat(chains[..., i], chain_axis=0, draw_axis=1, method="rank") for i in every)
     off = chains.mean(axis=(0, 1)) - reference.mean(axis=(0, 1))
     off = float(np.abs(off / reference.std(axis=(0, 1))).max())
-    cells = f"{evaluations:>12,}{seconds:>7.1f} s{r_hat:>8.3f}{ess:>8,.0f}{ess / seconds:>8,.1f}"
-    print(f"{name:<54}{cells}{1000.0 * ess / evaluations:>10.1f}{off:>11.3f}", flush=True)
+    cells = [f"{evaluations:,}", f"{seconds:.1f} s", f"{r_hat:.3f}", f"{ess:,.0f}", f"{ess / seconds:,.1f}"]
+    print(line(name, [*cells, f"{1000.0 * ess / evaluations:.1f}", f"{off:.3f}"], 54, 12), flush=True)
 
 
 # ---- samplers: from a target, starts (runs, walkers, parameters) and a number of evaluations to draws, shape
@@ -140,11 +141,8 @@ def population_of_pints(name: str) -> Sampler:
     def draw(target: Counted, start: Floats, evaluations: int) -> Floats:
         pints = import_module("pints")
         np.random.seed(1)  # noqa: NPY002, it knows no other random numbers
-        runs = []
-        for of_run in start:
-            method = getattr(pints, name)(WALKERS, list(of_run))
-            runs.append(asked(target, [method], steps_for(evaluations)))
-        return np.array(runs)
+        steps, method = steps_for(evaluations), getattr(pints, name)
+        return np.array([asked(target, [method(WALKERS, list(of_run))], steps) for of_run in start])
 
     return draw
 

@@ -16,11 +16,11 @@ import numpy as np
 import xarray as xr
 
 import tactile_bayes as tb
+from benchmarks.table import counts_and_names, line, results
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw, Smooth, from_points, paper_profile
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.sweep import Scan
-from tactile_bayes.tasks import run_tasks
 
 # Noise of forces [EI/L²] and of the moment [EI/L].
 NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.06)}
@@ -75,21 +75,18 @@ class Outcome(NamedTuple):
 
 
 def main(replicates: int = 4, workers: int = 2, *names: str) -> None:
-    chosen = names or tuple(TRUTHS)
-    tasks = [(name, noise, k) for name in chosen for noise in NOISES for k in range(replicates)]
-    outcomes: dict[tuple[str, str], list[Outcome]] = {(name, noise): [] for name in chosen for noise in NOISES}
-    for done, ((name, noise, _), outcome) in enumerate(run_tasks(record, tasks, workers=workers)):
+    tasks = [(name, noise, k) for name in names or TRUTHS for noise in NOISES for k in range(replicates)]
+    outcomes: dict[tuple[str, str], list[Outcome]] = {(name, noise): [] for name, noise, _ in tasks}
+    for (name, noise, _), outcome in results(record, tasks, workers):
         outcomes[name, noise].append(outcome)
-        if sys.stderr.isatty():
-            print(f"\r{done + 1} of {len(tasks)}", end="", file=sys.stderr)
     heads = ("in the gap", "out of it", "width [L]", "off [L]", "over known", "time", "longest", "converged", "check")
-    print(f"{'truth':<12}{'noise':<10}" + "".join(f"{head:>12}" for head in heads))
+    print(line(f"{'truth':<12}noise", heads, 22, 12))
     for (name, noise), of_kind in outcomes.items():
         table = np.array(of_kind, dtype=float)
         in_gap, out_of_gap, width, off, known, seconds, converged, passed = np.mean(table, axis=0)
-        print(f"{name:<12}{noise:<10}{in_gap:>12.2f}{out_of_gap:>12.2f}{width:>12.5f}{off:>12.5f}", end="")
-        print(f"{width / known:>12.2f}{seconds:>10.1f} s{table[:, 5].max():>10.1f} s{converged:>12.0%}", end="")
-        print(f"{f'passes {passed:.0%}':>12}")
+        cells = [f"{in_gap:.2f}", f"{out_of_gap:.2f}", f"{width:.5f}", f"{off:.5f}", f"{width / known:.2f}"]
+        cells += [f"{seconds:.1f} s", f"{table[:, 5].max():.1f} s", f"{converged:.0%}", f"passes {passed:.0%}"]
+        print(line(f"{name:<12}{noise}", cells, 22, 12))
 
 
 def record(task: tuple[str, str, int]) -> Outcome:
@@ -137,5 +134,5 @@ def compared(result: xr.DataTree, contour: Contour, x: Floats) -> tuple[float, f
 
 
 if __name__ == "__main__":
-    counts, names = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
-    main(*map(int, counts or ["4"]), *([2] if len(counts) < 2 else []), *names)
+    counts, names = counts_and_names(sys.argv[1:])
+    main(*[*counts, *(4, 2)[len(counts) :]], *names)

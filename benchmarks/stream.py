@@ -26,12 +26,12 @@ import numpy as np
 import xarray as xr
 
 import tactile_bayes as tb
+from benchmarks.table import counts_and_names, folder_name, line, stored
 from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
 from tactile_bayes.calibration.ranks import uniformity_p_value
 from tactile_bayes.calibration.simulation import simulate
-from tactile_bayes.errors import StudyError, TactileBayesError
+from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.streams.particles import LOST_ONCE
-from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
 
 OUT = Path("results/stream")
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -53,14 +53,11 @@ WRONG: Mapping[str, dict[str, Any]] = {
     "outliers (t, 2.5)": {"truth": replace(SMOOTH, load_cell=replace(CELL, degrees_of_freedom=2.5))},
 }
 Row = Mapping[str, Any]
-RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in row.items() if name != "number"})
 
 
 def main(records: int = 100) -> None:
     identity = {"particles": str(PARTICLES), "blocks": str(BLOCKS), "seed": str(SEED)}
-    with open_results_store(identity, OUT, RECORDS) as store:
-        kept = keep_outcomes(store, one, (), records, workers=None)
-    every = [kept[number] for number in range(records)]
+    every = stored(OUT, identity, one, (), records)
     report([row for row in every if "error" not in row], [row["error"] for row in every if "error" in row])
 
 
@@ -69,11 +66,8 @@ def one(task: tuple[tuple[()], int]) -> Row:
     _, number = task
     try:
         replicate = calibration_replicate(number, rig=tb.Rig(load_cell=CELL), rng=SEED)
-    except TactileBayesError as error:
-        return {"error": f"{number}: {error}"}
-    assert replicate.measured is not None
-    assert replicate.posterior is not None
-    try:
+        assert replicate.measured is not None
+        assert replicate.posterior is not None
         return compared(replicate.measured, replicate.truth, replicate.posterior, number)
     except TactileBayesError as error:
         return {"error": f"{number}: {error}"}
@@ -81,21 +75,18 @@ def one(task: tuple[tuple[()], int]) -> Row:
 
 def wrong(records: int = 20) -> None:
     print(f"e-values of {records} records each; a right model exceeds 1,000 in at most 0.1 % of them\n")
-    print(
-        f"{'what the model does not have':<32}{'told (1,000)':>13}{'after':>8}{'told (20)':>11}{'no particle left':>18}"
-    )
+    print(line("what the model does not have", ("told (1,000)", "after", "told (20)", "no particle left"), 32, 18))
     for name in WRONG:
-        folder = OUT / ("without-" + "".join(c if c.isalnum() else "-" for c in name))
-        with open_results_store({"without": name, "seed": str(SEED)}, folder, RECORDS) as store:
-            kept = keep_outcomes(store, wrong_one, name, records, workers=None)
-        every = [row["e_values"] for row in kept.values() if row.get("e_values")]
+        identity = {"without": name, "seed": str(SEED)}
+        rows = stored(OUT / folder_name(f"without-{name}"), identity, wrong_one, name, records)
+        every = [row["e_values"] for row in rows if row.get("e_values")]
         values = np.array([row + [row[-1]] * (BLOCKS - len(row)) for row in every])
         told = values > 1000.0
         early = told.any(axis=1)
         after = f"{np.median(told[early].argmax(axis=1) + 1) / BLOCKS:.0%}" if early.any() else ""
         some = (values[:, -1] > 20.0).mean()
-        ended = sum("error" in row or row["ended"] for row in kept.values())
-        print(f"{name:<32}{early.mean():>13.0%}{after:>8}{some:>11.0%}{ended:>18}", flush=True)
+        ended = sum("error" in row or row["ended"] for row in rows)
+        print(line(name, (f"{early.mean():.0%}", after, f"{some:.0%}", ended), 32, 18), flush=True)
 
 
 def wrong_one(task: tuple[str, int]) -> Row:
@@ -108,12 +99,10 @@ def wrong_one(task: tuple[str, int]) -> Row:
     except TactileBayesError as error:
         return {"error": f"{number}: {error}"}
     stream = tb.Stream(rig=SMOOTH, rng=number, particles=PARTICLES)
-    row: dict[str, Any] = {"e_values": [], "shifts": [], "ended": False}
+    row: dict[str, Any] = {"e_values": [], "ended": False}
     for block in np.array_split(np.arange(measured.sizes["sample"]), BLOCKS):
         try:
-            now = stream.update(measured.isel(sample=block))
-            row["e_values"].append(float(now.e_value))
-            row["shifts"].append(float(now.log_density_shift))
+            row["e_values"].append(float(stream.update(measured.isel(sample=block)).e_value))
         except TactileBayesError:
             row["ended"] = True
             break
@@ -143,8 +132,7 @@ def compared(measured: xr.Dataset, truth: Mapping[str, float], posterior: xr.Dat
     row["wider"] = float(np.mean((high - low) / (band["upper"] - band["lower"]).values))
     row["held_by_infer"] = bool(np.all((band["lower"] <= height) & (height <= band["upper"])))
     row["told"] = not bool(stream.posterior().attrs["converged"])
-    row["rise"], row["shift"] = float(now.log_density_rise), float(now.log_density_shift)
-    row["e_value"] = float(now.e_value)
+    row["shift"], row["e_value"] = float(now.log_density_shift), float(now.e_value)
     row["converged"] = bool(posterior.attrs["converged"])
     return row
 
@@ -163,17 +151,17 @@ def report(rows: list[Row], errors: list[str]) -> None:
     print(f"{np.median(seconds.max(axis=1)):.2f} s (median); without its first two, {_range(seconds[:, 2:])}")
     moves = seconds / np.maximum([row["stages"] for row in rows], 1)
     print(f"a stage takes {np.median(moves):.2f} s (median), 5 to 95 %: {_range(moves)}\n")
-    print(f"{'of the record':<18}{'smallest p':>12}{'band holds':>12}{'width [L]':>12}")
+    print(line("of the record", ("smallest p", "band holds", "width [L]"), 18, 12))
     for k, (name, at) in enumerate(zip(QUARTERS, range(BLOCKS // 4 - 1, BLOCKS, BLOCKS // 4), strict=True)):
         names = sorted({one for row in rows for one in row["ranks"][k]})
         of = [[row["ranks"][k][one] for row in rows if one in row["ranks"][k]] for one in names]
         values = [uniformity_p_value(each, DRAWS) for each in of]
         held, width = (np.array([row[what][at] for row in rows]) for what in ("held", "width"))
         smallest = f"{min(values):.2g} of {len(values)}"
-        print(f"{name:<18}{smallest:>12}{_share(held):>12}{np.median(width):>12.4f}")
-    print(f"{'infer_contour':<18}{'':>12}{_share(np.array([row['held_by_infer'] for row in rows])):>12}")
-    surprised = [np.mean([row["e_value"] > 1.0 / rate for row in rows]) for rate in ALARMS]
-    limits = ", ".join(f"{1.0 / rate:g} in {share:.1%}" for rate, share in zip(ALARMS, surprised, strict=True))
+        print(line(name, (smallest, _share(held), f"{np.median(width):.4f}"), 18, 12))
+    print(line("infer_contour", ("", _share([row["held_by_infer"] for row in rows])), 18, 12))
+    largest = np.array([row["e_value"] for row in rows])
+    limits = ", ".join(f"{1.0 / rate:g} in {np.mean(largest > 1.0 / rate):.1%}" for rate in ALARMS)
     print(f"\nthe largest e-value of a record, whose model is right, exceeds {limits} of records")
     told = [round(row["off_median"], 2) for row in rows if row["told"]]
     found_again = sum(row["shift"] > LOST_ONCE and not row["told"] for row in rows)
@@ -186,15 +174,14 @@ def report(rows: list[Row], errors: list[str]) -> None:
     print(f"difference of a quantile {np.median(off):.2f} (median of records), {off.max():.2f} (largest), of a median")
     wider = _range([row["wider"] for row in sure])
     print(f"{np.median(median):.2f}, {median.max():.2f}; width of the band over its width, 5 to 95 %: {wider}\n")
-    print(f"{'band at most':<18}{'stops before':>12}{'samples saved':>14}{'band holds then':>16}{'at the end':>12}")
+    print(line("band at most", ("stops before", "samples saved", "band holds then", "at the end"), 18, 16))
+    held = np.array([row["held"] for row in rows])
     for tolerance in TOLERANCES:
         enough = np.array([row["width"] for row in rows]) <= tolerance
         first = np.where(enough.any(axis=1), enough.argmax(axis=1), BLOCKS - 1)
-        held = np.array([row["held"] for row in rows])
-        saved = 1.0 - (first + 1) / BLOCKS
-        before = first < BLOCKS - 1
+        saved, before = 1.0 - (first + 1) / BLOCKS, first < BLOCKS - 1
         then = [f"{held[before, at].mean():.0%}" if before.any() else "" for at in (first[before], -1)]
-        print(f"{tolerance:<18}{before.mean():>12.0%}{saved.mean():>14.0%}{then[0]:>16}{then[1]:>12}")
+        print(line(f"{tolerance}", (f"{before.mean():.0%}", f"{saved.mean():.0%}", *then), 18, 16))
 
 
 def _range(values: Any) -> str:
@@ -207,5 +194,5 @@ def _share(held: Any) -> str:
 
 
 if __name__ == "__main__":
-    given = [int(argument) for argument in sys.argv[1:] if argument != "--wrong"]
-    wrong(*given) if "--wrong" in sys.argv else main(*given)
+    counts, _ = counts_and_names(sys.argv[1:])
+    wrong(*counts) if "--wrong" in sys.argv else main(*counts)

@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.misspecification import CASES, SETTINGS
+from benchmarks.table import counts_and_names, folder_name, line, stored
 from tactile_bayes.assessment.causes import causes
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.replicate import make_replicate
-from tactile_bayes.errors import StudyError, TactileBayesError
-from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
+from tactile_bayes.errors import TactileBayesError
 
 OUT = Path("results/trust")
 PROBABILITY = 0.95
@@ -48,47 +48,28 @@ CAUSE = {
 
 # Cases, with the ways to infer them that take parabolas.
 CHOSEN = [(name, other) for name, runs in CASES.items() for other, run in runs.items() if "family" not in run.options]
+CONCLUSIONS = ("holds", "holds, but the prior sets the gap", "do not rely on it")
 Row = Mapping[str, Any]
 
 
 def main(records: int = 6, *names: str) -> None:
     print(f"{records} records of each rig; bands of {PROBABILITY:.0%}; shares of conclusions, and of alarms\n")
-    heads = (
-        "in the gap",
-        "beside it",
-        "whole",
-        "holds",
-        "prior",
-        "do not",
-        "by parts",
-        "by check",
-        "cause",
-        "of two",
-        "lost",
-    )
-    print(f"{'':<46}" + "".join(f"{head:>11}" for head in heads), flush=True)
+    of_bands, of_conclusions = ("in the gap", "beside it", "whole"), ("holds", "prior", "do not")
+    of_alarms = ("by parts", "by check", "cause", "of two", "lost")
+    print(line("", (*of_bands, *of_conclusions, *of_alarms), 46), flush=True)
     every: list[Row] = []
     for name, other in CHOSEN:
         if names and name not in names:
             continue
-        rows = made(name, other, records)
+        what = f"{name} {other}"
+        identity = {"case": what, "probability": repr(PROBABILITY)}
+        rows = stored(OUT / folder_name(what), identity, one, (name, other), records)
         every += rows
-        print(line(f"{name} {other}", rows), flush=True)
+        print(line(what, cells(rows), 46), flush=True)
     counted = Counter((bool(row["whole"]), row["conclusion"]) for row in every if row["conclusion"] != LOST)
-    print(f"\n{'the band as a whole':<24}" + "".join(f"{said:>40}" for said in CONCLUSIONS))
-    for held in (True, False):
-        print(f"{'did hold' if held else 'did not hold':<24}" + "".join(f"{counted[held, s]:>40}" for s in CONCLUSIONS))
-
-
-CONCLUSIONS = ("holds", "holds, but the prior sets the gap", "do not rely on it")
-
-
-def made(name: str, other: str, records: int) -> list[Row]:
-    identity = {"case": f"{name} {other}", "probability": repr(PROBABILITY)}
-    folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in f"{name} {other}".strip())
-    with open_results_store(identity, folder, RECORDS) as store:
-        kept = keep_outcomes(store, one, (name, other), records, workers=None)
-    return [kept[number] for number in range(records)]
+    print("\n" + line("the band as a whole", CONCLUSIONS, 24, 40))
+    for held, words in ((True, "did hold"), (False, "did not hold")):
+        print(line(words, (counted[held, said] for said in CONCLUSIONS), 24, 40))
 
 
 def one(task: tuple[tuple[str, str], int]) -> Row:
@@ -113,7 +94,6 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
         "in_gap": numbers.get("pointwise_in_gap", math.nan),
         "beside": numbers.get("pointwise_beside", math.nan),
         "whole": float(np.nanmin(wholes)),
-        "converged": numbers["converged"],
         "rank": math.nan if numbers["check_passed"] else _rank(name, named),
     }
 
@@ -124,19 +104,15 @@ def _rank(case: str, named: list[str]) -> float:
     return math.nan if true is None else 1.0 + named.index(true) if true in named else 100.0
 
 
-def line(name: str, rows: list[Row]) -> str:
+def cells(rows: list[Row]) -> list[str]:
     left = [row for row in rows if row["conclusion"] != LOST]
     means = [_mean(row[key] for row in left) for key in ("in_gap", "beside", "whole")]
     shares = [np.mean([row["conclusion"] == said for row in left]) for said in CONCLUSIONS] if left else [math.nan] * 3
     shares += [_mean(row["split_p_value"] <= 0.01 for row in left), _mean(1.0 - row["check_passed"] for row in left)]
     ranks = [row["rank"] for row in left if not math.isnan(row["rank"])]
     shares += [_mean(float(rank <= most) for rank in ranks) for most in (1.0, 2.0)]
-    cells = (
-        [f"{mean:.2f}" for mean in means]
-        + [f"{share:.0%}" if share == share else "–" for share in shares]
-        + [str(len(rows) - len(left))]
-    )
-    return f"{name:<46}" + "".join(f"{cell:>11}" for cell in cells)
+    texts = [f"{share:.0%}" if share == share else "–" for share in shares]
+    return [*(f"{mean:.2f}" for mean in means), *texts, str(len(rows) - len(left))]
 
 
 def _mean(values: Any) -> float:
@@ -145,9 +121,6 @@ def _mean(values: Any) -> float:
     return float(np.mean(known)) if known else math.nan
 
 
-RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in row.items() if name != "number"})
-
-
 if __name__ == "__main__":
-    counts, chosen = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
-    main(*map(int, counts or ["6"]), *chosen)
+    counts, chosen = counts_and_names(sys.argv[1:])
+    main(*(counts or [6]), *chosen)

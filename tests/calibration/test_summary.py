@@ -55,8 +55,12 @@ def replicates(count, seed=0, share=0.9, numbers=None, **wrong):
     }
 
 
+def summed(rows):
+    return summary(EXPERIMENT.identity, EXPERIMENT.probability, rows)
+
+
 def judged(*arguments, **options):
-    return summary(EXPERIMENT, replicates(*arguments, **options))
+    return summed(replicates(*arguments, **options))
 
 
 FAILED = Outcome(
@@ -133,7 +137,7 @@ def test_a_little_is_not_told_from_nothing():
         number: Outcome(row.ranks, {**row.numbers, **dict.fromkeys(CLAIMS, 0.905 + 1e-5 * (number % 2))}, row.message)
         for number, row in replicates(100).items()
     }
-    assert summary(EXPERIMENT, rows).attrs["calibrated"] == 1
+    assert summed(rows).attrs["calibrated"] == 1
 
 
 # ---- few, failed, missing
@@ -158,7 +162,7 @@ def test_posteriors_that_lie_quite_elsewhere_are_not_called_narrow(shift, way):
 
 def test_a_lost_replicate_holds_nothing():
     rows = replicates(100) | {100: FAILED}
-    found = summary(EXPERIMENT, rows)
+    found = summed(rows)
     assert (found.attrs["calibrated"], found.attrs["replicates"], found.attrs["lost"]) == (1, 101, 1)
     assert "101 replicates" in found.attrs["verdict"]
     assert int(found["ranks"].sel(replicate=100, quantity="q")) == -1
@@ -175,19 +179,19 @@ def test_a_lost_replicate_holds_nothing():
 def test_lost_replicates_are_named_with_what_to_do():
     rows = replicates(100) | dict.fromkeys((7, 31), FAILED) | {99: FAILED._replace(message="ReachError: beyond")}
     lost = {number: rows[number].message for number in (7, 31, 99)}
-    assert summary(EXPERIMENT, rows).attrs["verdict"].endswith(f" {lost_message(lost)}")
+    assert summed(rows).attrs["verdict"].endswith(f" {lost_message(lost)}")
     assert "lost" not in judged(100).attrs["verdict"]
 
 
 def test_too_many_lost_are_no_calibration():
     """Nor a fault, though with them bands hold in fewer than nine of ten; and a fault of the others stands."""
     lost = dict.fromkeys(range(100, 160), FAILED)
-    found = summary(EXPERIMENT, replicates(100) | lost)
+    found = summed(replicates(100) | lost)
     assert (found.attrs["calibrated"], found.attrs["conclusion"], found.attrs["lost"]) == (0, "undecided", 60)
     assert np.all(found.coverage < 0.65)
     assert "160 replicates 60 were lost" in found.attrs["verdict"]
     assert f"Coverage at 90%: {CLAIMS['pointwise_in_gap']} " in found.attrs["verdict"]
-    found = summary(EXPERIMENT, replicates(100, q={"shift": 1.0}) | lost)
+    found = summed(replicates(100, q={"shift": 1.0}) | lost)
     assert found.attrs["conclusion"] == "not calibrated"
     assert re.search(r" 160 replicates: q: [\w ]* low\. Coverage at", found.attrs["verdict"])
 
@@ -201,14 +205,14 @@ def test_few_lost_ones_can_tip_the_scales():
         number: row._replace(numbers={"simultaneous_beside": float(number < fewest)})
         for number, row in replicates(1000).items()
     }
-    assert summary(EXPERIMENT, rows).attrs["conclusion"] == "calibrated"
-    found = summary(EXPERIMENT, rows | dict.fromkeys(range(10), FAILED))
+    assert summed(rows).attrs["conclusion"] == "calibrated"
+    found = summed(rows | dict.fromkeys(range(10), FAILED))
     assert found.attrs["conclusion"] == "not calibrated"
     assert f" 1000 replicates: {CLAIMS['simultaneous_beside']}: 85% hold, not 90%. " in found.attrs["verdict"]
 
 
 def test_nothing_but_failures():
-    found = summary(EXPERIMENT, dict.fromkeys(range(30), FAILED))
+    found = summed(dict.fromkeys(range(30), FAILED))
     assert (found.attrs["calibrated"], found.attrs["conclusion"]) == (0, "undecided")
     assert (found.sizes["quantity"], found.sizes["claim"]) == (0, 0)
     assert "30 replicates 30 were lost" in found.attrs["verdict"]
@@ -217,7 +221,7 @@ def test_nothing_but_failures():
 @pytest.mark.parametrize(("count", "conclusion"), [(5, "calibrated"), (6, "undecided")])
 def test_too_many_that_did_not_converge_are_no_calibration(count, conclusion):
     unconverged = replicates(100, numbers={"converged": 0.0})
-    found = summary(EXPERIMENT, replicates(100) | {number: unconverged[number] for number in range(count)})
+    found = summed(replicates(100) | {number: unconverged[number] for number in range(count)})
     assert (found.attrs["conclusion"], found.attrs["not_converged"]) == (conclusion, count)
     assert f" {count} did not converge" in found.attrs["verdict"]
 
@@ -259,7 +263,7 @@ def test_shares_that_are_missing_are_not_counted():
     rows = replicates(100)
     missing = {number: {**rows[number].numbers, "snap_off": np.nan} for number in range(40)}
     rows |= {number: rows[number]._replace(numbers=numbers) for number, numbers in missing.items()}
-    found = summary(EXPERIMENT, rows)
+    found = summed(rows)
     known = [rows[number].numbers["snap_off"] for number in range(40, 100)]
     assert int(found.coverage_replicates.sel(claim="snap_off")) == 60
     np.testing.assert_allclose(found.coverage.sel(claim="snap_off"), np.mean(known))
@@ -268,14 +272,14 @@ def test_shares_that_are_missing_are_not_counted():
 
 def test_replicates_are_in_order_whatever_came_first():
     rows = replicates(20)
-    backwards = summary(EXPERIMENT, dict(reversed(rows.items())))
+    backwards = summed(dict(reversed(rows.items())))
     assert list(backwards.replicate.values) == list(range(20))
-    assert backwards.identical(summary(EXPERIMENT, rows))
+    assert backwards.identical(summed(rows))
     assert list(backwards["ranks"].sel(quantity="q").values) == [rows[number].ranks["q"] for number in range(20)]
 
 
 def test_a_summary_can_be_kept(tmp_path):
-    found = summary(EXPERIMENT, replicates(20) | {20: FAILED})
+    found = summed(replicates(20) | {20: FAILED})
     found.to_netcdf(tmp_path / "calibration.nc")
     with xr.open_dataset(tmp_path / "calibration.nc") as again:
         assert again.attrs["verdict"] == found.attrs["verdict"]
