@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from functools import cache
@@ -17,7 +19,6 @@ from threadpoolctl import threadpool_limits
 import tactile_bayes as tb
 from benchmarks.samplers import demonstration, started
 from benchmarks.shooting import contact_by_integration, misfit_by_least_squares, sweep_by_collocation, sweep_by_shooting
-from benchmarks.starting import starting
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Parabola
@@ -155,9 +156,8 @@ def posteriors() -> Row:
             def log_density(points: Floats, one: ContactDensity = one) -> Floats:
                 return one.at(*one.unfold(points[:, None])).log_density[:, 0]
 
-            sample(
-                log_density, starts[:, :, i], names=("way", "force"), seed=np.random.SeedSequence(i), settings=settings
-            )
+            seed = np.random.SeedSequence(i)
+            sample(log_density, starts[:, :, i], names=("way", "force"), seed=seed, settings=settings)
 
     by_emcee = best_time(by_hand, 1) / starts.shape[2]
     count = int((tb.reconstruct(measured).status != "no contact").sum())
@@ -190,6 +190,19 @@ def contour_posterior() -> tuple[Row, str]:
         f"Posterior: {float(stats.ess_bulk.min()):,.0f} effective draws of {stats.attrs['evaluations']:,} evaluations; "
         f"emcee's own moves gave {ess:,.0f} of {start.shape[0] * start.shape[1] * STRETCHES:,} in {seconds:.1f} s"
     )
+
+
+def starting() -> list[Row]:
+    """Time importing this package, and the help of its command, in new processes beside importing scipy.stats."""
+    ours = {"import tactile_bayes": "import tactile_bayes"}
+    ours["tactile-bayes --help"] = "from tactile_bayes.cli import app; app(['--help'])"
+
+    def time_of(code: str) -> float:
+        command = [sys.executable, "-c", code]
+        return best_time(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL), repeats=3)
+
+    reference = time_of("import scipy.stats")
+    return [Row(f"start: import scipy.stats / {what}", reference, time_of(code)) for what, code in ours.items()]
 
 
 def sweeps(by_hand: float) -> list[Row]:

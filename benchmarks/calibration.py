@@ -40,12 +40,6 @@ class Family(NamedTuple):
     friction: float | None = None  # coefficient of friction in truth, if it is not drawn
 
 
-class Noise(NamedTuple):
-    title: str
-    force: float  # standard deviation [EI/L²]
-    moment: float  # standard deviation [EI/L]
-
-
 FAMILIES = {
     "parabola": Family("parabolas", 1000),
     "circle": Family("circles", 500),
@@ -68,11 +62,9 @@ STICKING = {
 }
 TRACED = {"traced": Family("traced rods", 200)}  # each swept with a rod of its own, by `benchmarks.traced`
 EVERY = {**FAMILIES, **STICKING, **TRACED}
-NOISES = {
-    "usual": Noise("at the usual noise", 0.05, 0.02),
-    "tenth": Noise("at a tenth of the noise", 0.005, 0.002),
-    "threefold": Noise("at three times the noise", 0.15, 0.06),
-}
+NOISES = {"usual": "at the usual noise", "tenth": "at a tenth of the noise", "threefold": "at three times the noise"}
+# Standard deviations of forces [EI/L²] and of the moment [EI/L].
+_DEVIATIONS = {"usual": (0.05, 0.02), "tenth": (0.005, 0.002), "threefold": (0.15, 0.06)}
 
 
 def folder_of(family: str, noise: str) -> str:
@@ -80,7 +72,8 @@ def folder_of(family: str, noise: str) -> str:
 
 
 def load_cell(noise: str) -> tb.LoadCell:
-    return tb.LoadCell(force_noise=NOISES[noise].force, moment_noise=NOISES[noise].moment)
+    force, moment = _DEVIATIONS[noise]
+    return tb.LoadCell(force_noise=force, moment_noise=moment)
 
 
 def conditions(family: str, noise: str) -> dict[str, Any]:
@@ -119,8 +112,8 @@ def _rows(family: str, noise: str) -> list[dict[str, str]]:
 
 def _outcome(row: dict[str, str]) -> Outcome:
     known = {name: float(text) for name, text in row.items() if text}
-    ranks = {name: int(value) for name, value in known.items() if name not in NUMBERS}
-    return Outcome(ranks, {name: known[name] for name in NUMBERS if name in known}, "")
+    numbers = {name: known.pop(name) for name in NUMBERS if name in known}
+    return Outcome({name: int(rank) for name, rank in known.items()}, numbers, "")
 
 
 def pooled(family: str, noise: str, each: Iterable[xr.Dataset]) -> xr.Dataset:
@@ -140,10 +133,11 @@ def publish(family: str, noise: str, made: xr.Dataset) -> None:
         raise SystemExit(
             f"{path} holds more replicates than the {made.sizes['replicate']} made: remove it to publish these"
         )
-    names = [name for name in NUMBERS if name in made]
-    columns = {str(name): made["ranks"].sel(quantity=name).values for name in made.quantity.values}
-    columns = {name: [rank if rank >= 0 else "" for rank in ranks] for name, ranks in columns.items()}
-    columns |= {name: [str(v) if np.isfinite(v) else "" for v in made[name].values.tolist()] for name in names}
+    ranks = {str(name): made["ranks"].sel(quantity=name).values for name in made.quantity.values}
+    columns = {name: [rank if rank >= 0 else "" for rank in of_one] for name, of_one in ranks.items()}
+    for name in NUMBERS:
+        if name in made:
+            columns[name] = [str(v) if np.isfinite(v) else "" for v in made[name].values.tolist()]
     with write_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file).writerows([columns, *zip(*columns.values(), strict=True)])
 
@@ -160,12 +154,10 @@ def table(noise: str, calibrations: dict[str, xr.Dataset]) -> str:
 
     p_values = [one.rank_p_value.dropna("quantity") for one in found]
     smallest = [f"{float(each.min()):.2g} of {each.size}" if each.size else "–" for each in p_values]
+    titles = [f"{one.sizes['replicate']} {EVERY[family].title}" for family, one in calibrations.items()]
     return "\n".join(
         [
-            row(
-                NOISES[noise].title,
-                (f"{one.sizes['replicate']} {EVERY[family].title}" for family, one in calibrations.items()),
-            ),
+            row(NOISES[noise], titles),
             "|" + "---|" * (len(found) + 1),
             *(held(name) for name in CLAIMS),
             row("smallest p-value of the ranks", smallest),
@@ -198,7 +190,7 @@ def main(*chosen: str) -> None:
         if "published" in chosen:
             made = published(families, noise)
             if not made:
-                print(f"no replicates of {', '.join(families)} at {NOISES[noise].title} are published", flush=True)
+                print(f"no replicates of {', '.join(families)} {NOISES[noise]} are published", flush=True)
                 continue
         else:
             made = {name: calibrated(name, noise, count) for name in families}

@@ -28,7 +28,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.sweep import Rotation
+from tactile_bayes.sweep import Motion, Rotation, Translation
 from tactile_bayes.tasks import Workers
 
 module = importlib.import_module("tactile_bayes.calibration.calibrate")
@@ -63,12 +63,7 @@ def made_up(task):
 def noted(monkeypatch):
     """Numbers of the replicates that are made, which take no time."""
     numbers = []
-
-    def note(task):
-        numbers.append(task[1])
-        return made_up(task)
-
-    monkeypatch.setattr(module, "replicate", note)
+    monkeypatch.setattr(module, "replicate", lambda task: numbers.append(task[1]) or made_up(task))
     return numbers
 
 
@@ -81,9 +76,6 @@ def small(tmp_path_factory):
     """Two replicates of few steps, in this process, and where they are kept."""
     folder = tmp_path_factory.mktemp("small") / "on the way"
     return quickly(settings=FEW_STEPS, out=folder), folder
-
-
-# ---- what comes of it
 
 
 def test_what_is_found(small):
@@ -105,9 +97,6 @@ def test_workers_change_nothing_but_the_seconds(small):
     assert other.drop_vars("seconds").identical(found.drop_vars("seconds"))
 
 
-# ---- what is lost
-
-
 @pytest.fixture(scope="module")
 def with_lost(tmp_path_factory):
     """Three replicates that fail, each at another stage, one that does not, and where they are kept."""
@@ -122,8 +111,8 @@ def test_a_failure_is_an_outcome_whatever_it_comes_from(with_lost):
     assert (found.sizes["replicate"], found.attrs["lost"]) == (4, 3)
     np.testing.assert_array_equal((found["ranks"] >= 0).any("quantity"), [False, False, False, True])
     rows = rows_of(folder)
-    for number, (stage, words) in enumerate(STAGES.items()):
-        row, message = rows[number], f"StrangeError: an error {words}"
+    for number, ((stage, words), row) in enumerate(zip(STAGES.items(), rows, strict=False)):
+        message = f"StrangeError: an error {words}"
         assert (row["number"], row["ranks"], row["message"]) == (number, {}, message)
         assert f"{stage}(" in row["traceback"]
         assert row["traceback"].endswith(f"{message}\n")
@@ -156,9 +145,6 @@ def test_an_interrupt_is_no_failure_and_loses_the_replicate(tmp_path, monkeypatc
     with pytest.raises(KeyboardInterrupt, match="replicate 0" if stage == "sampled" else None):
         quickly(settings=FEW_STEPS, out=tmp_path)
     assert rows_of(tmp_path) == []
-
-
-# ---- one replicate again
 
 
 def again(number, **options):
@@ -209,33 +195,24 @@ def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
         runs.append(settings)
         return sampled(problem, settings=FEW_STEPS, **options)
 
-    monkeypatch.setattr("tactile_bayes.calibration.replicate.sampled", spied)
-    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "rng": 1}
-    assert not calibration_replicate(0, **asked).outcome.numbers["converged"]
-    first, second = runs
-    assert first == BY_DEFAULT
-    assert second == replace(BY_DEFAULT, walkers=None, max_steps=6000)
-    runs.clear()
-    calibration_replicate(0, settings=FEW_STEPS, **asked)
-    assert runs == [FEW_STEPS]
+    monkeypatch.setattr(making, "sampled", spied)
+    assert not again(0, settings=None).outcome.numbers["converged"]
+    again(0)
+    assert runs == [BY_DEFAULT, replace(BY_DEFAULT, walkers=None, max_steps=6000), FEW_STEPS]
 
 
-def test_a_replicate_of_another_calibration_is_refused(small, tmp_path):
+def test_a_replicate_of_another_calibration_is_refused(small):
     with refused(CalibrationError, seed=1):
         again(0, out=small[1], rng=2)
-    for number in (-1, True, 0.0, "1"):
+    for number in (-1, True, "1"):
         with refused(ParameterError, repr(number)):
             again(number)
 
 
 def test_defaults_of_one_replicate_are_those_of_all():
-    own, all_of_them = (inspect.signature(function).parameters for function in (experiment_of, calibrate))
-    assert {name: option.default for name, option in own.items()} == {name: all_of_them[name].default for name in own}
-    others = set(all_of_them) - set(own)
-    assert others == {"replicates", "out", "workers"}
-
-
-# ---- going on
+    own, every = (dict(inspect.signature(function).parameters) for function in (experiment_of, calibrate))
+    assert {name: every.pop(name).default for name in own} == {name: option.default for name, option in own.items()}
+    assert set(every) == {"replicates", "out", "workers"}
 
 
 def test_more_replicates_begin_with_those_that_are_there(noted, tmp_path):
@@ -250,19 +227,12 @@ def test_more_replicates_begin_with_those_that_are_there(noted, tmp_path):
     made = [(1, 2, 1), (2, 2, 2), (3, 5, 1), (4, 5, 2), (5, 5, 3)]
     assert [(state.done, state.wanted, state.made) for state in told] == made
     fewer = quickly(replicates=3, out=tmp_path)
-    assert fewer.sizes["replicate"] == 3
-    assert len(noted) == 5
-    assert len(rows_of(tmp_path)) == 5  # none is lost
-
-
-def test_a_gap_is_filled(noted, tmp_path):
-    whole = quickly(replicates=4, out=tmp_path)
+    assert (fewer.sizes["replicate"], len(noted), len(rows_of(tmp_path))) == (3, 5, 5)  # none is lost
     table = json.loads((tmp_path / REPLICATES.file).read_text())
     del table["replicates"][1]
     (tmp_path / REPLICATES.file).write_text(json.dumps(table))
-    noted.clear()
-    assert quickly(replicates=4, out=tmp_path).identical(whole)
-    assert noted == [1]
+    assert quickly(replicates=5, out=tmp_path).identical(whole)
+    assert noted[5:] == [1]  # a gap is filled
 
 
 ENDLESS = """
@@ -346,6 +316,27 @@ def test_defaults_may_be_written_out():
     assert found == experiment_of(rig=AS_STATED, rng=1).identity
 
 
+FORTH, BACK = Translation((0.9, 0.0), np.pi, 1.0, 1.8), Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8)
+
+
+def test_the_drives_are_part_of_what_a_calibration_is():
+    said = [experiment_of(rng=1, drive=drive).identity["drives"] for drive in ([FORTH, BACK], FORTH, None)]
+    assert len(set(said)) == 3
+
+
+@pytest.mark.slow
+def test_a_replicate_is_scored_by_the_travel_of_its_end():
+    family = Family("circle", r=stats.uniform(0.25, 0.1), q=stats.uniform(0.75, 0.1), x_c=stats.norm(0.0, 0.02))
+    drive = [Translation((0.8, 0.0), np.pi, 1.1, 1.6), Motion([-0.8, 0.8], 0.0, [2.2, 1.6])]
+    replicate = calibration_replicate(0, family, AS_STATED, rng=1, drive=drive)
+    assert replicate.outcome.message.startswith("converged")
+    assert {"snap_off_forward", "snap_off_backward"} <= replicate.outcome.ranks.keys()
+    measured = replicate.measured
+    assert np.unique(measured.sweep.values).tolist() == [0, 1]
+    assert measured.direction.values[[0, -1]].tolist() == ["forward", "backward"]
+    np.testing.assert_allclose(measured.base_x.values[[0, 120, 121, 241]], [0.8, -0.8, -0.8, 0.8], atol=1e-12)
+
+
 # ---- what is refused
 
 
@@ -386,10 +377,22 @@ def test_the_right_posterior_passes():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("family", ["parabola", "circle"])
+def test_the_right_posterior_of_a_carried_rod_passes(family):
+    found = calibrate(family, rng=3, replicates=60, drive=[FORTH, BACK], workers=2)
+    assert found.attrs["conclusion"] == "calibrated", found.attrs["verdict"]
+
+
+@pytest.mark.slow
 def test_what_is_at_an_end_of_its_prior_has_no_rank():
     found = quickly(replicates=2, rig=AS_STATED.with_unknown(friction="default"), truth=AS_STATED)
     assert "friction" not in found["quantity"].values
     assert "log_likelihood" in found["quantity"].values
+
+
+def finds(found, quantity, way):
+    assert found.attrs["calibrated"] == 0
+    assert re.search(rf"{quantity}: [\w ]* {way}\b", found.attrs["verdict"])
 
 
 @pytest.mark.slow
@@ -397,9 +400,7 @@ def test_noise_larger_than_told_is_found():
     """Of 10 %, where it is sure to 1 %: posteriors lie some nine times that too low; power is above 99.9 %."""
     rig = AS_STATED.with_unknown(noise_scale=stats.lognorm(s=0.01))
     truth = replace(rig, load_cell=LoadCell(force_noise=0.055, moment_noise=0.022))
-    found = quickly(replicates=25, rig=rig, truth=truth, workers=None)
-    assert found.attrs["calibrated"] == 0
-    assert re.search(r"noise_scale: [\w ]* low\b", found.attrs["verdict"])
+    finds(quickly(replicates=25, rig=rig, truth=truth, workers=None), "noise_scale", "low")
 
 
 @pytest.mark.slow
@@ -409,14 +410,8 @@ def test_a_shifted_prior_is_found():
     Posteriors lie 1.7 of their standard deviations too low; power is above 99.9 %.
     """
     rig = Rig(load_cell=LoadCell(force_noise=0.5, moment_noise=0.2), unknown="nothing")
-    found = quickly(
-        replicates=40,
-        rig=rig.with_unknown(rigidity_scale=stats.lognorm(s=0.01)),
-        truth=rig.with_unknown(rigidity_scale=stats.lognorm(s=0.01, scale=1.02)),
-        workers=None,
-    )
-    assert found.attrs["calibrated"] == 0
-    assert re.search(r"rigidity_scale: [\w ]* low\b", found.attrs["verdict"])
+    stiff, stiffer = (rig.with_unknown(rigidity_scale=stats.lognorm(s=0.01, scale=scale)) for scale in (1.0, 1.02))
+    finds(quickly(replicates=40, rig=stiff, truth=stiffer, workers=None), "rigidity_scale", "low")
 
 
 @pytest.mark.slow
@@ -433,6 +428,4 @@ def test_a_wrong_sampler_is_found(monkeypatch):
         return there, np.where(np.isfinite(ratio), -ratio, ratio)
 
     monkeypatch.setattr(moves.FittedMove, "get_proposal", turned)
-    found = quickly(replicates=40)
-    assert found.attrs["calibrated"] == 0
-    assert re.search(r"log_likelihood: [\w ]* worse\b", found.attrs["verdict"])
+    finds(quickly(replicates=40), "log_likelihood", "worse")

@@ -26,9 +26,6 @@ def power(count, probability, coverage, is_whole):
     return float(binomial(count, coverage) @ (p_values(count, probability, is_whole) <= LEVEL))
 
 
-# ---- p values
-
-
 def test_p_values_of_whole_claims_are_twice_a_binomial_tail():
     """Of the coverage next to the share that a hundredth more or less allows."""
     found = p_values(50, 0.9, True)
@@ -44,15 +41,9 @@ def test_p_values_of_shares_are_the_bound():
     found = float(coverage_p_value(0.7, 40, 0.9, is_whole=False))
     np.testing.assert_allclose(found, 2.0 * ((0.89 / 0.7) ** 0.7 * (0.11 / 0.3) ** 0.3) ** 40, rtol=1e-12)
     assert np.all(p_values(40, 0.9, False) >= p_values(40, 0.9, True) * (1.0 - 1e-12))
-
-
-def test_nothing_is_more_than_all():
-    """Of what is stated with 99.5 % a hundredth more is everything."""
+    # Of what is stated with 99.5 % a hundredth more is everything.
     assert coverage_p_value(1.0, 1000, 0.995, is_whole=True) == 1.0
     assert coverage_p_value(0.0, 1000, 0.005, is_whole=True) == 1.0
-
-
-# ---- what is noticed
 
 
 @pytest.mark.parametrize("is_whole", [True, False])

@@ -21,18 +21,13 @@ def radius(slope_angle):
     return (1.0 + np.tan(slope_angle) ** 2) ** 1.5 / 1.2
 
 
-# ---- what it may be
-
-
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"base_shift": 0.1}, ["base_shift", "0.1"]),
         ({"base_shift": (0.1, math.nan)}, ["base_shift", "(0.1, nan)"]),
         ({"base_shift": (0.1, 0.2, 0.3)}, ["base_shift", "(0.1, 0.2, 0.3)"]),
         ({"base_shift": None}, ["base_shift", "None"]),
         ({"flat_spot": 0.3}, ["flat_spot", "0.3"]),
-        ({"flat_spot": ("a", "b")}, ["flat_spot", "('a', 'b')"]),
         ({"flat_spot": (0.1, 0.0)}, ["flat spot", "positive", "0"]),
         ({"flat_spot": (0.1, -1.0)}, ["flat spot", "positive", "-1"]),
         ({"family": "cube"}, ["'cube'"]),
@@ -44,24 +39,14 @@ def test_what_cannot_be_is_refused(wrong, named):
         Misspecification(**wrong)
 
 
-def test_it_says_in_what_it_differs():
+def test_it_says_in_what_it_differs_and_can_be_compared():
     assert repr(Misspecification()) == "Misspecification()"
     assert repr(Misspecification(base_shift=(0, 0.0))) == "Misspecification()"
     assert repr(Misspecification(base_shift=[0.1, 0])) == "Misspecification(base_shift=(0.1, 0.0))"
     assert repr(Misspecification(family="circle")) == "Misspecification(family=Family('circle'))"
-
-
-def test_misspecifications_can_be_compared():
     assert Misspecification() == Misspecification()
     assert Misspecification(family="circle") == Misspecification(family=Family("circle")) != Misspecification()
     assert Misspecification(family=Family("circle", r=0.5)) != Misspecification(family="circle")
-
-
-# ---- the object
-
-
-def test_without_a_flat_spot_the_object_is_what_was_drawn():
-    assert Misspecification(base_shift=(0.1, 0.0)).contour(DRAWN) is DRAWN
 
 
 @pytest.mark.parametrize("at", [0.3, -0.8, 0.0])
@@ -87,6 +72,7 @@ def test_flat_spot_is_where_it_should_be_and_nowhere_else(at, factor):
 
 
 def test_flat_spot_leaves_the_lowest_point_where_it_was():
+    assert Misspecification(base_shift=(0.1, 0.0)).contour(DRAWN) is DRAWN
     object_ = Misspecification(flat_spot=(0.7, 2.0)).contour(DRAWN)
     assert object_.shape == (1,)
     np.testing.assert_allclose(np.ravel(object_.point(0.0)), [0.1, 0.4], atol=1e-12)
@@ -95,9 +81,6 @@ def test_flat_spot_leaves_the_lowest_point_where_it_was():
     np.testing.assert_allclose(np.ravel(x)[0], expected, atol=1e-5)  # before the spot all is as it was
     np.testing.assert_allclose(np.ravel(y)[0], 0.4 + 0.6 * (expected - 0.1) ** 2, atol=1e-5)
     assert np.ravel(x)[1] > 0.1 + np.tan(1.1) / 1.2 + 0.05  # and beyond it the object is wider
-
-
-# ---- the rig
 
 
 def test_all_pivots_are_shifted_on_top_of_what_was_drawn():

@@ -39,9 +39,6 @@ def five_errors(probability, count):
     return 5.0 * math.sqrt(probability * (1.0 - probability) / count)
 
 
-# ---- of uniform ranks
-
-
 @pytest.mark.parametrize(("count", "top"), [pytest.param(100, 99, marks=pytest.mark.slow), (37, 9)])
 def test_p_values_of_uniform_ranks_are_uniform(count, top):
     """False alarm 1e-6 for each share. Ties make p-values larger, but hardly."""
@@ -81,9 +78,6 @@ def test_level_agrees_with_arviz():
     assert np.mean(ours <= theirs + 1e-12) >= 1.0 - probability - error
 
 
-# ---- of others
-
-
 def test_extremes():
     assert uniformity_p_value(np.arange(100), 99) == 1.0
     for rank in (0, 99):
@@ -92,10 +86,7 @@ def test_extremes():
     assert uniformity_p_value(np.arange(1000) % 2, 1) == 1.0
     assert uniformity_p_value(np.ones(1000, dtype=bool), 1) == LEAST
     assert uniformity_p_value([True, False] * 50, 1) == 1.0
-
-
-def test_one_rank_says_what_it_can():
-    """A single rank in the middle is nothing unusual; one at an end is, with a probability of two in a hundred."""
+    # A single rank in the middle is nothing unusual; one at an end is, with a probability of two in a hundred.
     assert uniformity_p_value([50], 99) > 0.9
     assert abs(uniformity_p_value([0], 99) - 0.02) <= five_errors(0.02, _SIMULATIONS)
 
@@ -106,9 +97,6 @@ def test_order_does_not_matter_and_numbers_are_the_same_again():
     _null.cache_clear()
     assert uniformity_p_value(ranks[::-1], 4) == first
     assert uniformity_p_value(list(map(int, ranks)), 4) == first
-
-
-# ---- what is noticed
 
 
 def test_rank_probabilities_of_one_draw():
@@ -149,5 +137,4 @@ def test_what_is_noticed_by_none():
 
 
 def test_expected_shares_are_those_of_uniform_ranks():
-    np.testing.assert_allclose(expected_shares(4), [0.2, 0.4, 0.6, 0.8], rtol=1e-15)
     np.testing.assert_allclose(expected_shares(99), shares_of([np.arange(100)], 99)[0], rtol=1e-14)

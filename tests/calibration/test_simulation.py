@@ -53,6 +53,10 @@ def loads_of(record):
     return np.stack([record[name].values for name in CHANNELS], axis=-1)
 
 
+def same_loads(made, scan):
+    np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
+
+
 def contour_of(made, left=0.0, up=0.0):
     """The parabola that was drawn, as seen from a pivot that is moved."""
     return Parabola(a=made.truth["a"], q=made.truth["q"] + up, x_c=made.truth["x_c"] - left)
@@ -80,9 +84,6 @@ def agree(made, scan, *, rigidity=1.0, zeros=0.0):
     for name in ("sweep", "base_x", "base_y"):
         np.testing.assert_array_equal(made.measured[name], scan.record[name])
     np.testing.assert_array_equal(made.measured.direction, scan.record.direction)
-
-
-# ---- loads
 
 
 @pytest.mark.parametrize("direction", ["both", "forward", "backward"])
@@ -116,17 +117,12 @@ def test_a_lever_and_a_backlash_of_the_cell_that_measures(told):
 def test_the_truth_has_what_is_known_of_it():
     """The truth of what is inferred is drawn no more."""
     biases, drifts = (0.1, 0.2, 0.3), (-0.1, 0.0, 0.4)
-    known = {"rigidity_scale": 1.1, "drive_angle_offset": 0.05}
-    for names, values in ((GROUPS["bias"], biases), (GROUPS["drift"], drifts)):
-        known |= dict(zip(names, values, strict=True))
-    made = simulated(
-        unknown=among("rigidity_scale", "bias", "drift", "taper"),
-        truth=Misspecification(real(**known), base_shift=(0.03, -0.02)),
-    )
+    known = dict(zip(GROUPS["bias"] + GROUPS["drift"], biases + drifts, strict=True))
+    known |= {"rigidity_scale": 1.1, "drive_angle_offset": 0.05}
+    truth = Misspecification(real(**known), base_shift=(0.03, -0.02))
+    made = simulated(unknown=among("rigidity_scale", "bias", "drift", "taper"), truth=truth)
     way = np.linspace(-0.5, 0.5, made.measured.sizes["sample"])[:, None]
-    scan = tb.scan(
-        contour_of(made, left=0.03, up=0.02), drive_angles=ANGLES - 0.05
-    )  # as seen from the pivot where it is
+    scan = tb.scan(contour_of(made, left=0.03, up=0.02), drive_angles=ANGLES - 0.05)  # seen from where the pivot is
     agree(made, scan, rigidity=1.1, zeros=np.array(biases) + np.array(drifts) * way)
     inferred = {name: value for name, value in known.items() if name != "drive_angle_offset"}
     assert {name: made.truth[name] for name in inferred} == pytest.approx(inferred, abs=1e-12)
@@ -160,14 +156,12 @@ def test_pivots_are_shifted():
     """All by the same, and those after the first besides."""
     stated = [(0.0, 0.0), (0.2, 0.0), (-0.2, 0.05)]
     shift, further = np.array([0.03, -0.02]), np.array([0.01, 0.02])
-    truth = real(base_x=further[0], base_y=further[1])
-    made = simulated(
-        drive=[replace(DRIVE, base=pivot) for pivot in stated], truth=Misspecification(truth, base_shift=tuple(shift))
-    )
+    truth = Misspecification(real(base_x=further[0], base_y=further[1]), base_shift=tuple(shift))
+    made = simulated(drive=[replace(DRIVE, base=pivot) for pivot in stated], truth=truth)
     moved = np.array(stated) + shift + further * np.array([[0.0], [1.0], [1.0]])
     scan = scanned(made, base=[tuple(pivot) for pivot in moved])
     assert made.measured.sizes["sample"] == scan.record.sizes["sample"]
-    np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
+    same_loads(made, scan)
     np.testing.assert_array_equal(np.unique(made.measured.base_x), [-0.2, 0.0, 0.2])
 
 
@@ -175,13 +169,9 @@ def test_what_is_drawn_of_an_si_rod():
     """Rigidity, the encoder's offset and biases; the angles read are those of the truth and the offset."""
     cell = LoadCell(force_noise=1e-12 * SI.force_unit, moment_noise=1e-12 * SI.moment_unit)
     family = Family("parabola", a=stats.uniform(4.0, 4.0), q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01))
-    made = simulated(
-        family=family,
-        rod=SI,
-        load_cell=cell,
-        unknown=among("rigidity_scale", "drive_angle_offset", "bias", "drift"),
-        truth=Misspecification(base_shift=(0.003, 0.0)),
-    )
+    unknown = among("rigidity_scale", "drive_angle_offset", "bias", "drift")
+    truth = Misspecification(base_shift=(0.003, 0.0))
+    made = simulated(family=family, rod=SI, load_cell=cell, unknown=unknown, truth=truth)
     offset = made.truth["drive_angle_offset"]
     way = np.linspace(-0.5, 0.5, made.measured.sizes["sample"])[:, None]
     scan = tb.scan(contour_of(made, left=0.003), drive_angles=ANGLES - offset, rig=Rig(rod=SI))
@@ -193,9 +183,8 @@ def test_what_is_drawn_of_an_si_rod():
 
 def test_forces_in_the_frame_of_a_cell_that_turns():
     made = simulated(load_cell=replace(QUIET, frame="turning"))
-    expected = loads_of(scanned(made).record)
-    angle = made.measured.drive_angle.values
-    turned = np.exp(-1j * angle) * (expected[:, 1] + 1j * expected[:, 2])
+    _, x, y = loads_of(scanned(made).record).T
+    turned = np.exp(-1j * made.measured.drive_angle.values) * (x + 1j * y)
     np.testing.assert_allclose(made.measured.force_x, turned.real, atol=1e-8)
     np.testing.assert_allclose(made.measured.force_y, turned.imag, atol=1e-8)
 
@@ -204,7 +193,7 @@ def test_a_flat_spot_is_felt():
     """The object is what the simulation says it is."""
     made = simulated(truth=Misspecification(flat_spot=(0.3, 2.0)))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
-    np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
+    same_loads(made, scan)
     assert np.max(np.abs(loads_of(made.measured) - loads_of(scanned(made).record))) > 1e-3
 
 
@@ -213,7 +202,7 @@ def test_contours_of_another_family():
     asked = experiment("parabola", truth=Misspecification(family="circle"))
     made = simulate(asked, np.random.default_rng(2))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
-    np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
+    same_loads(made, scan)
     assert "r" in made.truth
     assert "a" in asked.problem_of(made.measured).model.names
     assert not asked.is_of_family
@@ -223,15 +212,11 @@ def test_friction_and_the_events_of_a_scan():
     made = simulated(unknown={**NOTHING, "friction": 0.1}, truth=real(friction=0.3))
     scan = scanned(made, friction=0.3)
     agree(made, scan)
-    for segment, direction in enumerate(("forward", "backward")):
-        sweep = scan.events[direction]
+    for segment, sweep in enumerate(scan.sweeps):
         for label, event in (("first", sweep.first_contact), ("snap_off", sweep.snap_off)):
             for name in ("drive_angle", "contact_x", "contact_y"):
                 mine = made.events[f"{label}_{name}"][segment]
                 np.testing.assert_allclose(mine, getattr(event, name), atol=1e-7, err_msg=name)
-
-
-# ---- the load cell
 
 
 def noise_of(made):
@@ -274,9 +259,6 @@ def test_the_encoder_of_a_cell_that_is_told():
     assert abs(np.mean(errors**2) - 1.0) < 5.0 * np.sqrt(2.0 / errors.size)  # false alarm 1e-6
 
 
-# ---- truths
-
-
 def test_truths_come_from_the_other_family_and_inference_takes_its_own():
     other = Family("parabola", a=0.7, q=stats.uniform(0.45, 0.01))
     asked = experiment(truth=Misspecification(family=other))
@@ -309,32 +291,16 @@ def test_a_truth_that_does_not_fit_is_refused(truth, named):
 
 def test_the_true_value_of_what_is_inferred_is_that_of_the_simulated_rig():
     """With it the model of inference explains the record, whatever differs of its parameters."""
-    cell = replace(
-        QUIET,
-        drive_angle_backlash=0.02,
-        drive_angle_offset=-0.01,
-        bias=(0.0, 2e-5, 0.0),
-        lever=(1e-4, -2e-4),
-        gain=((1.05, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-        moment_curve=(30.0, 0.0),
-    )
+    encoder = {"drive_angle_backlash": 0.02, "drive_angle_offset": -0.01}
+    gain = ((1.05, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    cell = replace(QUIET, **encoder, bias=(0.0, 2e-5, 0.0), lever=(1e-4, -2e-4), gain=gain, moment_curve=(30.0, 0.0))
     rod = Rod(length=0.1005, flexural_rigidity=1.1e-5, rest_curvature=0.2, taper=0.01)
-    known = {
-        "friction": 0.3,
-        "rigidity_scale": 1.2,
-        "drive_angle_offset": 0.05,
-        "taper": 0.02,
-        "moment_bias": 1e-6,
-        "force_y_bias": -2e-5,
-        "force_x_drift": 1e-5,
-        "base_2_x": 1e-3,
-        "base_2_y": -2e-3,
-    }
+    known = {"friction": 0.3, "rigidity_scale": 1.2, "drive_angle_offset": 0.05, "taper": 0.02, "moment_bias": 1e-6}
+    known |= {"force_y_bias": -2e-5, "force_x_drift": 1e-5, "base_2_x": 1e-3, "base_2_y": -2e-3}
     of_cell = ("drive_angle_offset", "backlash", "bias", "drift", "lever", "moment_gain", "moment_curve")
     names = ("friction", "rigidity_scale", *of_cell, "rest_curvature", "taper", "length", "base")
-    family = Family(
-        "parabola", a=stats.lognorm(s=0.4, scale=6.0), q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01)
-    )
+    a = stats.lognorm(s=0.4, scale=6.0)
+    family = Family("parabola", a=a, q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01))
     truth = Rig(rod=rod, load_cell=cell, unknown={**NOTHING, **known})
     drive = [DRIVE, replace(DRIVE, base=(0.02, 0.0))]
     made = simulated(family=family, rod=SI, drive=drive, unknown=among(*names), truth=truth)

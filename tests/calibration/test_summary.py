@@ -32,8 +32,7 @@ def posteriors(rng, count, shift=0.0, scale=1.0):
 
 def claims(rng, share):
     """Shares of a replicate, of places that know of one another: nearly all of a band is in, or nearly none."""
-    found = {}
-    end = ndtri(0.5 + 0.5 * share)
+    found, end = {}, ndtri(0.5 + 0.5 * share)
     for name in CLAIMS:
         common, own = rng.normal(), rng.normal(size=PLACES.get(name, 1))
         inside = np.abs(0.95 * common + np.sqrt(1.0 - 0.95**2) * own) < end
@@ -63,12 +62,8 @@ def judged(*arguments, **options):
     return summed(replicates(*arguments, **options))
 
 
-FAILED = Outcome(
-    {}, {"seconds": 0.5}, "InferenceError: no contour fits", "Traceback …\nInferenceError: no contour fits\n"
-)
-
-
-# ---- right
+NO_FIT = "InferenceError: no contour fits"
+FAILED = Outcome({}, {"seconds": 0.5}, NO_FIT, f"Traceback …\n{NO_FIT}\n")
 
 
 def test_right_posteriors_are_calibrated():
@@ -90,9 +85,6 @@ def test_false_alarms_are_as_rare_as_stated(sets, count):
     """Over sets of right replicates; more are had by chance once in 10 000."""
     false = sum(judged(count, seed=seed).attrs["calibrated"] == 0 for seed in range(sets))
     assert false <= stats.binom.isf(1e-4, sets, FALSE_ALARM)
-
-
-# ---- wrong
 
 
 @pytest.mark.parametrize(
@@ -133,14 +125,10 @@ def test_what_does_not_hold_as_often_as_stated_is_named(share):
 
 def test_a_little_is_not_told_from_nothing():
     """Quantiles of some hundred draws miss a probability by a hundredth."""
-    rows = {
-        number: Outcome(row.ranks, {**row.numbers, **dict.fromkeys(CLAIMS, 0.905 + 1e-5 * (number % 2))}, row.message)
-        for number, row in replicates(100).items()
-    }
+    rows = replicates(100)
+    for number, row in rows.items():
+        row.numbers.update(dict.fromkeys(CLAIMS, 0.905 + 1e-5 * (number % 2)))
     assert summed(rows).attrs["calibrated"] == 1
-
-
-# ---- few, failed, missing
 
 
 @pytest.mark.parametrize("count", [1, 2, 19])
@@ -201,10 +189,8 @@ def test_few_lost_ones_can_tip_the_scales():
     """Where a band holds five times more often than is a fault, and then ten of those are lost."""
     level = FALSE_ALARM / (len(NAMES) + 1)
     fewest = int(stats.binom.ppf(level / 2.0, 1000, 0.89)) + 5  # a hundredth less than 90 % is right as well
-    rows = {
-        number: row._replace(numbers={"simultaneous_beside": float(number < fewest)})
-        for number, row in replicates(1000).items()
-    }
+    made = replicates(1000).items()
+    rows = {number: row._replace(numbers={"simultaneous_beside": float(number < fewest)}) for number, row in made}
     assert summed(rows).attrs["conclusion"] == "calibrated"
     found = summed(rows | dict.fromkeys(range(10), FAILED))
     assert found.attrs["conclusion"] == "not calibrated"
@@ -230,9 +216,6 @@ def test_alarms_of_the_check_are_counted():
     assert "alarm in 100.0% of 20" in judged(20, numbers={"check_passed": 0.0}).attrs["verdict"]
 
 
-# ---- power
-
-
 def test_power_is_stated():
     found = judged(100)
     attrs = found.attrs
@@ -256,13 +239,10 @@ def test_a_shift_of_the_size_that_is_stated_is_noticed_as_often():
     assert stats.binom.sf(noticed - 1, 200, 0.9) > 5e-7
 
 
-# ---- order, files
-
-
 def test_shares_that_are_missing_are_not_counted():
     rows = replicates(100)
-    missing = {number: {**rows[number].numbers, "snap_off": np.nan} for number in range(40)}
-    rows |= {number: rows[number]._replace(numbers=numbers) for number, numbers in missing.items()}
+    for number in range(40):
+        rows[number].numbers["snap_off"] = np.nan
     found = summed(rows)
     known = [rows[number].numbers["snap_off"] for number in range(40, 100)]
     assert int(found.coverage_replicates.sel(claim="snap_off")) == 60

@@ -8,7 +8,7 @@ import pytest
 
 import tactile_bayes as tb
 from tactile_bayes.contours import paper_profile
-from tactile_bayes.planning.amplification import METHODS, SOURCES, amplification
+from tactile_bayes.planning.amplification import METHODS, SOURCES, amplification, contact_errors
 from tactile_bayes.planning.family_parameters import enlarged
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import Rig
@@ -21,17 +21,14 @@ THICK = tb.Rod.circular(length=0.2, diameter=5e-3, youngs_modulus=1e9)
 QUIET_SI = tb.LoadCell(force_noise=5e-6 * THICK.force_unit, moment_noise=2e-6 * THICK.moment_unit)
 
 TALKING = ((1.02, 0.01, -0.02), (0.03, 0.97, 0.01), (-0.01, 0.02, 1.01))
-
-
+CIRCLE = tb.contours.Circle(0.3, 0.8)
+SHIFTS = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6)]
 PLANS = {
     "cross-talk": Plan(PROFILE, Rig(load_cell=replace(QUIET, gain=TALKING, drive_angle_offset=0.02))),
     "correlated noise": Plan(PROFILE, Rig(load_cell=replace(QUIET, correlation=(0.3, -0.2, 0.5)))),
     "all of it turning": Plan(
         enlarged(PROFILE, 0.2),
-        Rig(
-            load_cell=replace(QUIET_SI, drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5)),
-            rod=THICK,
-        ),
+        Rig(THICK, replace(QUIET_SI, drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5))),
     ),
     "friction": Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6), unknown={"friction": 0.3})),
     "another pivot": Plan(paper_profile("III", q=0.4), Rig(load_cell=QUIET), drive=tb.Rotation((0.2, -0.1))),
@@ -63,27 +60,26 @@ def loaded(plan):
 
 
 def reconstructed(record, plan, method):
-    found = tb.reconstruct(
-        record, method=method, rig=Rig(rod=plan.rod, load_cell=plan.cell, unknown={"friction": plan.friction})
-    )
-    return found.contact_x.values, found.contact_y.values
+    rig = Rig(rod=plan.rod, load_cell=plan.cell, unknown={"friction": plan.friction})
+    found = tb.reconstruct(record, method=method, rig=rig)
+    return np.array([found.contact_x.values, found.contact_y.values])
+
+
+def along_and_across(x, y, record):
+    slope = record.truth_slope_angle.values
+    return np.cos(slope) * x + np.sin(slope) * y, np.cos(slope) * y - np.sin(slope) * x
 
 
 def differences(plan, method, source):
     """Central ones of contacts along and across the contour, over two and four standard deviations: (samples, 2)."""
-    record = loaded(plan)
-    slope = record.truth_slope_angle.values
-    cos, sin = np.cos(slope), np.sin(slope)
-    units = {"holding_moment": plan.rod.moment_unit, "drive_angle": 1.0}
+    record, units = loaded(plan), {"holding_moment": plan.rod.moment_unit, "drive_angle": 1.0}
     found = []
     for step in STEPS[method]:
         step = step * units.get(source, plan.rod.force_unit)
         more, less = (
-            np.array(reconstructed(record.assign({source: record[source] + sign * step}), plan, method))
-            for sign in (1, -1)
+            reconstructed(record.assign({source: record[source] + sign * step}), plan, method) for sign in (1, -1)
         )
-        x, y = (more - less) / (2.0 * step)
-        found.append(np.stack([cos * x + sin * y, cos * y - sin * x], axis=1))
+        found.append(np.stack(along_and_across(*((more - less) / (2.0 * step)), record), axis=1))
     return (4.0 * found[0] - found[1]) / 3.0  # Richardson
 
 
@@ -108,6 +104,26 @@ def test_gains_are_differences_of_reconstruct(name, method):
         np.testing.assert_array_less(np.abs(found - right) / scale, TOLERANCES[method])
 
 
+def test_gains_of_a_carried_rod_are_differences_of_reconstruct():
+    plan = Plan(CIRCLE, Rig(load_cell=QUIET), drive=SHIFTS)
+    found, record = contact_errors(plan), loaded(plan)
+    strong = np.hypot(record.force_x, record.force_y).values > 0.2
+    assert strong.sum() > 10
+    gain = found.gain_along.sel(reconstruction="raw", source="force_y").values
+    np.testing.assert_allclose(differences(plan, "raw", "force_y")[strong, 0], gain[strong], rtol=1e-3, atol=1e-4)
+
+
+def test_distances_are_along_the_drive():
+    plan = Plan(CIRCLE, Rig(load_cell=QUIET), drive=replace(SHIFTS[0], drive_step=0.05))
+    found, (sweep,) = amplification(plan), plan.scan.sweeps
+    travel = 0.8 - found.base_x.values
+    np.testing.assert_allclose(found.after_first_contact, travel - sweep.first_contact.travel, atol=1e-12)
+    np.testing.assert_allclose(found.before_snap_off, sweep.snap_off.travel - travel, atol=1e-12)
+    assert {found[name].attrs["units"] for name in ("after_first_contact", "before_snap_off")} == {"1"}
+    both = amplification(Plan(CIRCLE, Rig(load_cell=QUIET), drive=[tb.Rotation(), SHIFTS[0]]))
+    assert both.before_snap_off.attrs["units"] == "rad, 1"
+
+
 SLOWLY = [pytest.param(name, marks=pytest.mark.slow) for name in ("correlated noise", "friction", "cross-talk")]
 
 
@@ -117,23 +133,18 @@ def test_standard_deviations_are_those_of_noise_that_is_drawn(name):
     draws = 600
     plan, grown = in_the_middle(name)
     record, rng = loaded(plan), np.random.default_rng(1)
-    count = record.sizes["sample"]
-    every = np.arange(0, count, 3)
+    every = np.arange(0, record.sizes["sample"], 3)
     record, grown = record.isel(sample=every), grown.isel(sample=every)
     cell = replace(plan.cell, bias=(0.0, 0.0, 0.0), gain=tb.LoadCell().gain)
     noise = cell.simulate(np.zeros((draws, every.size, 3)), rng=rng).reshape(-1, 3)
     many = record.isel(sample=np.tile(np.arange(every.size), draws))
     noisy = {name: many[name] + noise[:, k] for k, name in enumerate(tb.record.CHANNELS)}
     noisy["drive_angle"] = many.drive_angle + cell.drive_angle_noise * rng.standard_normal(noise.shape[0])
-    slope = record.truth_slope_angle.values
-    cos, sin = np.cos(slope), np.sin(slope)
+    truth = np.array([record.truth_contact_x.values, record.truth_contact_y.values])
     for method in METHODS:
-        x, y = (
-            found.reshape(draws, every.size) - record[f"truth_contact_{axis}"].values
-            for axis, found in zip("xy", reconstructed(many.assign(noisy), plan, method), strict=True)
-        )
+        off = reconstructed(many.assign(noisy), plan, method).reshape(2, draws, every.size) - truth[:, None]
         of = grown.sel(reconstruction=method)
-        for error, sd in ((cos * x + sin * y, of.sd_along), (cos * y - sin * x, of.sd_across)):
+        for error, sd in zip(along_and_across(*off, record), (of.sd_along, of.sd_across), strict=True):
             ratio = np.sqrt(np.mean(error**2, axis=0)) / sd.values
             assert np.all(np.abs(ratio - 1.0) < 4.5 / np.sqrt(2.0 * draws)), (method, ratio)
 

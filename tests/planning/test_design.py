@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError, StudyError
@@ -59,22 +60,16 @@ def test_with_one_truth_it_is_the_information_of_its_record():
     A load cell of twice the noise leaves twice the band, where priors say little.
     """
     told = known_from_prior(AS_STATED, FAMILY, draws=3, rng=np.random.default_rng(1))
-    x = np.linspace(-0.5, 0.5, 11)
-    one, other = (
-        replace(told, points=np.array([[0.5, 0.5, 0.0, scale]]), precision=1e-9 * np.eye(4)) for scale in (1.0, 2.0)
-    )
-    found, noisier = (
-        expected_of((Question(truth, (Candidate((Rotation(drive_step=STEP),)),), x, 0.95, 0, 1), 0))
-        for truth in (one, other)
-    )
+    x, candidates = np.linspace(-0.5, 0.5, 11), (Candidate((Rotation(drive_step=STEP),)),)
+    truths = [replace(told, points=np.array([[0.5, 0.5, 0.0, k]]), precision=1e-9 * np.eye(4)) for k in (1.0, 2.0)]
+    found, noisier = (expected_of((Question(truth, candidates, x, 0.95, 0, 1), 0)) for truth in truths)
     angles = np.arange(np.radians(-30.0), np.radians(210.0), STEP)
     rig = Rig(load_cell=told.experiment.rig.load_cell, unknown="nothing")
     bounds = information(Plan(Parabola(0.5, q=0.5), rig, drive=Rotation(drive_angles=angles)))
     slopes = np.stack([x**2, np.ones_like(x), -x * 2.0 * 0.5], axis=1)  # of a (x − x_c)² + q
     # Bounds are those without priors, of four parameters of which the noise is independent.
     deviation = bounds.bound.values[:3]
-    correlation = bounds.correlation.values[:3, :3]
-    covariance = correlation * np.outer(deviation, deviation)
+    covariance = bounds.correlation.values[:3, :3] * np.outer(deviation, deviation)
     width = 2.0 * stats.norm.ppf(0.975) * np.sqrt(np.einsum("xi,ij,xj->x", slopes, covariance, slopes))
     assert found.width[0] == pytest.approx(width.mean(), rel=1e-3)
     assert found.reached == 1.0
@@ -141,12 +136,7 @@ def test_what_is_kept_is_not_made_again(tmp_path):
 def test_in_metres_and_newtons_it_is_the_same():
     rod = Rod(length=0.2, flexural_rigidity=2e-3)
     cell = LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-    known = Family(
-        "parabola",
-        a=stats.lognorm(0.3, scale=0.6 / 0.2),
-        q=stats.uniform(0.4 * 0.2, 0.2 * 0.2),
-        x_c=stats.norm(0.0, 0.05 * 0.2),
-    )
+    known = Family("parabola", a=stats.lognorm(0.3, scale=3.0), q=stats.uniform(0.08, 0.04), x_c=stats.norm(0.0, 0.01))
     si = designed(known, rig=Rig(rod=rod, load_cell=cell, unknown="nothing"), drives=pivots((0.0, 0.0), (0.04, 0.0)))
     plain = designed()
     np.testing.assert_allclose(si.width.values / 0.2, plain.width.values, rtol=1e-3)
@@ -154,15 +144,43 @@ def test_in_metres_and_newtons_it_is_the_same():
     assert si.width.attrs["units"] == "m"
 
 
+CIRCLE, CARRIED = tb.contours.Circle(0.3, 0.8), Translation((0.8, 0.0), np.pi, 1.1, 1.6)
+BACK = Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6)
+
+
+@pytest.mark.slow
+def test_drives_that_carry_the_base_are_candidates():
+    """Two translations tell more than one of them, and a pivot among drives is what it is among pivots."""
+    known = Family("circle", r=stats.uniform(0.25, 0.1), q=stats.uniform(0.75, 0.1), x_c=stats.norm(0.0, 0.02))
+    options = {"draws": 4, "criterion": Criterion(span=(-0.2, 0.2)), "rig": Rig()}
+    found = designed(known, drives=[CARRIED, [CARRIED, BACK], Rotation()], **options)
+    assert found.drive.values[0] == "carried from (0.8, 0) to (-0.8, 0) at 63°"
+    assert found.width[1] < found.width[0]
+    assert np.all(found.reached > 0.0)
+    pivot = designed(known, drives=[Rotation()], **options)
+    assert float(pivot.width[0]) == pytest.approx(float(found.width[2]), rel=1e-12)
+
+
+@pytest.mark.slow
+def test_a_posterior_of_a_carried_rod_is_what_is_known():
+    """Its drive is none of the pivots so far, and what it touched leaves no gap."""
+    cell = LoadCell(force_noise=0.005, moment_noise=0.002)
+    record = cell.measure(scan(CIRCLE, drive=replace(CARRIED, drive_step=0.04)).record, rng=1)
+    rig = Rig(load_cell=cell, unknown="nothing")
+    posterior = infer_contour(record, family="circle", rig=rig, rng=1, settings=QUICK)
+    found = designed(posterior, drives=[Rotation(), BACK], draws=4)
+    assert found.sizes["pivot"] == 0
+    assert np.all(found.width < found.present_width)
+    assert np.all(found.gap == 0.0)
+
+
 def test_a_posterior_is_known_by_its_own_rig(posterior):
     told = known_from_posterior(posterior, draws=5, rng=np.random.default_rng(1))
     assert told.bases == ((0.0, 0.0),)
     assert told.experiment.noise.cell.force_noise == CELL.force_noise
-    deviation = np.sqrt(np.diag(np.linalg.inv(told.precision)))
     samples = posterior["posterior"].to_dataset()
-    np.testing.assert_allclose(
-        deviation, [float(samples[name].std()) for name in ("a", "q", "x_c", "noise_scale")], rtol=1e-3
-    )
+    deviations = [float(samples[name].std()) for name in ("a", "q", "x_c", "noise_scale")]
+    np.testing.assert_allclose(np.sqrt(np.diag(np.linalg.inv(told.precision))), deviations, rtol=1e-3)
 
 
 @pytest.mark.slow
@@ -248,7 +266,7 @@ def test_candidates_say_what_they_are(posterior):
 
 
 def test_the_usual_drives_are_about_the_pivot_so_far_in_lengths_of_the_rod(posterior):
-    of_prior, so_far = (usual_drives(FAMILY, Rig(rod=Rod(0.2, 1.0))), usual_drives(posterior, drive_step=0.1))
+    of_prior, so_far = usual_drives(FAMILY, Rig(rod=Rod(0.2, 1.0))), usual_drives(posterior, drive_step=0.1)
     assert len(of_prior) == len(set(of_prior)) == 33
     np.testing.assert_allclose([d.base for d in of_prior], 0.2 * np.array([d.base for d in so_far]), atol=1e-15)
     assert {drive.drive_step for drive in so_far} == {0.1}
@@ -258,6 +276,7 @@ def test_the_usual_drives_are_about_the_pivot_so_far_in_lengths_of_the_rod(poste
     ("options", "error", "named"),
     [
         ({"drives": pivots((0.0, -2.0), (0.0, -3.0))}, ReachError, ["x = 0", "y from -3 to -2", "1 L"]),
+        ({"drives": ["left"]}, ParameterError, ["drive", "'left'"]),
         ({"rig": AS_STATED}, ParameterError, ["rig", "posterior"]),
         ({"known": "shape-free"}, ParameterError, ["family"]),
         ({"known": xr.DataTree()}, InferenceError, ["infer_contour"]),

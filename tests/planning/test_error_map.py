@@ -51,14 +51,24 @@ def test_another_seed_draws_other_noise_and_expects_the_same():
     np.testing.assert_array_equal(other.expected_gap_width.values, nearer.expected_gap_width.values)
 
 
-# ---- going on
-
-
 class KilledError(Exception):
     pass
 
 
-def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path):
+OTHERS = (
+    {"rng": 4},
+    {"replicates": 3},
+    {"over": {**SMALL["over"], "noise_factor": [2.0]}},
+    {"contours": {"II": Parabola(0.6, 0.5)}},
+    {"rig": Rig(load_cell=tb.LoadCell(force_noise=0.1, moment_noise=0.02), unknown="nothing")},
+    {"rig": Rig(unknown={**NOTHING, "friction": 0.1})},
+    {"bands": Bands(family=tb.Family("parabola", a=stats.norm(0.5, 0.1)))},
+    {"drive": tb.Rotation((0.1, 0.0), drive_step=0.1)},
+    {"drive": tb.Rotation(direction="forward", drive_step=0.1)},
+)
+
+
+def test_a_map_that_was_killed_goes_on_where_it_was_and_another_is_refused_its_folder(tmp_path):
     def kill(progress):
         if progress.done == 1:
             raise KilledError
@@ -69,39 +79,13 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path):
     assert [row["number"] for row in rows] == [0]
     seen = []
     for _ in range(2):
-        found = mapped(workers=Workers(1, seen.append), out=tmp_path)
-        xr.testing.assert_identical(found, small())
+        xr.testing.assert_identical(mapped(workers=Workers(1, seen.append), out=tmp_path), small())
     assert [(p.done, p.wanted, p.made) for p in seen] == [(2, 2, 1)]
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        {"rng": 4},
-        {"replicates": 3},
-        {"over": {**SMALL["over"], "noise_factor": [2.0]}},
-        {"contours": {"II": Parabola(0.6, 0.5)}},
-        {"rig": Rig(load_cell=tb.LoadCell(force_noise=0.1, moment_noise=0.02), unknown="nothing")},
-        {"rig": Rig(unknown={**NOTHING, "friction": 0.1})},
-        {"bands": Bands(family=tb.Family("parabola", a=stats.norm(0.5, 0.1)))},
-        {"drive": tb.Rotation((0.1, 0.0), drive_step=0.1)},
-        {"drive": tb.Rotation(direction="forward", drive_step=0.1)},
-    ],
-    ids=str,
-)
-def test_the_folder_of_another_study_is_refused(tmp_path, other):
-    def stop(progress):
-        raise KilledError
-
-    with pytest.raises(KilledError):
-        mapped(workers=Workers(1, stop), out=tmp_path)
     before = (tmp_path / "cells.json").read_bytes()
-    with refused(StudyError, "another experiment", "there", "here"):
-        mapped(**other, out=tmp_path)
+    for other in OTHERS:
+        with refused(StudyError, "another experiment", "there", "here"):
+            mapped(**other, out=tmp_path)
     assert (tmp_path / "cells.json").read_bytes() == before
-
-
-# ---- numbers
 
 
 def test_first_order_is_what_small_noise_gives():
@@ -109,21 +93,17 @@ def test_first_order_is_what_small_noise_gives():
 
     A mean square of some samples has the variance 2 Σ σ⁴/(Σ σ²)², over the replicates.
     """
-    replicates, step = 24, np.radians(6.0)
-    drive = tb.Rotation(drive_step=step)
+    replicates, drive = 24, tb.Rotation(drive_step=np.radians(6.0))
     found = mapped(over={"noise_factor": [0.01]}, replicates=replicates, drive=drive, rng=1).squeeze()
     plan = Plan(paper_profile("II", q=0.5), drive=drive).with_noise(0.01)
-    angles = np.unique(plan.scan.record.drive_angle.values)
-    grown = amplification(Plan(plan.contour, Rig(load_cell=plan.cell), drive=tb.Rotation(drive_angles=angles)))
+    grown = amplification(plan.at_angles(np.unique(plan.scan.record.drive_angle.values)))
     for method in ("raw", "constrained"):
         of = grown.sel(reconstruction=method)
         ok = of.holds.values
         for name in ("along", "across"):
             variance = of[f"sd_{name}"].values[ok] ** 2
             error = np.sqrt(2.0 * np.sum(variance**2) / replicates) / np.sum(variance)
-            ratio = float(found[f"rms_{name}"].sel(reconstruction=method)) / float(
-                found[f"first_order_{name}"].sel(reconstruction=method)
-            )
+            ratio = float((found[f"rms_{name}"] / found[f"first_order_{name}"]).sel(reconstruction=method))
             assert error < 0.2
             assert abs(ratio**2 - 1.0) < 4.5 * error, (method, name, ratio, error)
 
@@ -185,17 +165,7 @@ def test_posteriors_are_inferred_in_some_cells():
         np.testing.assert_array_equal(found[name].values, plain[name].values)
 
 
-# ---- what is refused
-
-
 AXES = ([], 0.5, ["near"], [[0.5]], [0.5, -0.1], [0.0], [np.inf], [1.0, 2.0, 1.0])
-
-
-@pytest.mark.parametrize("axis", ["distance", "noise_factor"])
-@pytest.mark.parametrize("numbers", AXES, ids=str)
-def test_bad_axes_are_refused(axis, numbers):
-    with refused(ParameterError, **{axis: numbers}):
-        mapped(over={axis: numbers})
 
 
 WRONG = {
@@ -213,6 +183,7 @@ WRONG = {
     ("call", "wrong"),
     [
         *((mapped, {name: value}) for name, values in WRONG.items() for value in values),
+        *((lambda **axis: mapped(over=axis), {name: v}) for name in ("distance", "noise_factor") for v in AXES),
         *((Bands, wrong) for wrong in ({"posterior_cells": -1}, {"posterior_replicates": 0}, {"probability": 1.0})),
     ],
 )

@@ -1,5 +1,6 @@
 """What a record tells: against the curvature of the likelihood, dense algebra, exact scaling, and a posterior."""
 
+import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -63,9 +64,8 @@ def swept(a, q, x_c, less, direction):
 def readings(plan, values, by_angle=0.0):
     """What the plan's cell would read, by `scan`: shape (samples, 3)."""
     of = dict(zip(plan.model.forward_parameters, map(float, values), strict=True))
-    loads, angles = swept(
-        of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.drive.direction
-    )
+    less = of.get("drive_angle_offset", 0.0) - by_angle
+    loads, angles = swept(of["a"], of["q"], of["x_c"], less, plan.drive.direction)
     if plan.cell.frame == "turning":
         cos, sin = np.cos(angles), np.sin(angles)
         moment, x, y = loads.T
@@ -76,11 +76,9 @@ def readings(plan, values, by_angle=0.0):
 
 def scan_slopes(plan):
     """Of the readings by parameters, shape (samples, 3, d), and by the drive angle; steps of 1e-5 leave some 1e-10."""
-    centre, every = located(plan), []
-    for i in range(centre.size):
-        move = np.zeros(centre.size)
-        move[i] = 1e-5
-        every.append((readings(plan, centre + move) - readings(plan, centre - move)) / 2e-5)
+    centre = located(plan)
+    moves = 1e-5 * np.eye(centre.size)
+    every = [(readings(plan, centre + move) - readings(plan, centre - move)) / 2e-5 for move in moves]
     by_angle = (readings(plan, centre, 1e-5) - readings(plan, centre, -1e-5)) / 2e-5
     return np.stack(every, axis=-1), by_angle
 
@@ -105,21 +103,17 @@ def test_information_is_the_curvature_of_the_log_likelihood(name):
     centre = located(plan)
     data = readings(plan, centre)
     found = record_information(plan.model, plan.point).matrix[: centre.size, : centre.size]
-    size = centre.size
     # About a tenth of a deviation, and the same for all cells.
-    step = np.array([1e-4, 1.5e-5, 5e-5, 1e-4, 3e-4, 1e-3, 1e-3])[:size]
-    signs = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
-    right = np.empty((size, size))
-    for i in range(size):
-        for j in range(i + 1):
-            total = 0.0
-            for one, other in signs:
-                move = np.zeros(size)
-                move[i] += one * step[i]
-                move[j] += other * step[j]
-                log = plan.cell.log_likelihood(data, readings(plan, centre + move))
-                total += one * other * float(log)
-            right[i, j] = right[j, i] = -total / (4.0 * step[i] * step[j])
+    step = np.array([1e-4, 1.5e-5, 5e-5, 1e-4, 3e-4, 1e-3, 1e-3])[: centre.size]
+    moves, right = np.diag(step), np.empty((centre.size, centre.size))
+
+    def log_likelihood(move):
+        return float(plan.cell.log_likelihood(data, readings(plan, centre + move)))
+
+    for i, j in itertools.combinations_with_replacement(range(centre.size), 2):
+        signs = itertools.product((1, -1), repeat=2)
+        mixed = sum(one * other * log_likelihood(one * moves[i] + other * moves[j]) for one, other in signs)
+        right[i, j] = right[j, i] = -mixed / (4.0 * step[i] * step[j])
     assert_matrices_agree(found, right, 1e-4)
 
 
@@ -134,12 +128,9 @@ def test_information_of_an_encoder_is_that_of_dense_algebra(name, frame):
     np.testing.assert_allclose(found.by_parameters / scale, slopes / scale, rtol=0.0, atol=1e-6)
     np.testing.assert_allclose(found.by_angle, by_angle, rtol=0.0, atol=1e-6 * np.abs(by_angle).max())
     np.testing.assert_allclose(found.loads, readings(plan, located(plan)), rtol=0.0, atol=1e-6)
-    root = np.diag([0.02, 0.05, 0.05])
-    m, x, y = cell.correlation
-    white = root @ np.array([[1.0, m, x], [m, 1.0, y], [x, y, 1.0]]) @ root
-    right = sum(
-        j.T @ np.linalg.inv(white + encoder**2 * np.outer(a, a)) @ j for j, a in zip(slopes, by_angle, strict=True)
-    )
+    white = np.outer(cell.noise, cell.noise) * cell.correlation_matrix
+    each = [np.linalg.inv(white + encoder**2 * np.outer(turned, turned)) for turned in by_angle]
+    right = np.einsum("nci,ncd,ndj->ij", slopes, each, slopes)
     size = len(plan.model.forward_parameters)
     assert_matrices_agree(record_information(plan.model, plan.point).matrix[:size, :size], right, 1e-6)
 
@@ -177,10 +168,8 @@ def test_students_t_tells_less_by_a_known_factor(nu):
 
     of_place = mean(lambda z: (nu + 1.0) * z / (nu + z * z))
     of_scale = mean(lambda z: (nu + 1.0) * z * z / (nu + z * z) - 1.0)
-    normal, outlying = (
-        record_information(p.model, p.point).matrix
-        for p in (between(), between(cell=replace(CELL, degrees_of_freedom=nu)))
-    )
+    cells = (CELL, replace(CELL, degrees_of_freedom=nu))
+    normal, outlying = (record_information(p.model, p.point).matrix for p in (between(cell=cell) for cell in cells))
     np.testing.assert_allclose(outlying[:-1, :-1], of_place * normal[:-1, :-1], rtol=1e-6, atol=1e-6)
     assert outlying[-1, -1] == pytest.approx(of_scale * 3 * 2 * BETWEEN.size, rel=1e-8)
     assert normal[-1, -1] == pytest.approx(2.0 * 3 * 2 * BETWEEN.size)
@@ -232,9 +221,8 @@ def test_a_calibrated_rig_knows_its_parameters_together():
     priors = {"rigidity_scale": stats.lognorm(s=sds[0]), "drive_angle_offset": stats.norm(0.0, sds[1])}
     joint = RigPrior(priors, np.array([[1.0, correlation], [correlation, 1.0]]), 0.0, "0")
     unknown = {name: value for name, value in expanded(NOTHING).items() if name not in priors}
-    plan = Plan(
-        PROFILE, Rig(load_cell=CELL, unknown=unknown, calibration=joint), drive=tb.Rotation(drive_angles=BETWEEN)
-    )
+    rig = Rig(load_cell=CELL, unknown=unknown, calibration=joint)
+    plan = Plan(PROFILE, rig, drive=tb.Rotation(drive_angles=BETWEEN))
     names = [plan.model.names.index(name) for name in priors]
     found = np.linalg.inv(prior_precision(plan.model)[np.ix_(names, names)])
     right = [float(plan.model.priors[name].std()) for name in priors]
@@ -326,11 +314,9 @@ def test_leverage_sums_to_what_is_told():
 
 def test_leverage_on_a_parameter_is_what_is_lost_without_the_sample():
     """Of a forward sweep, by a plan without that drive angle."""
-    forward = tb.Rotation(direction="forward", drive_angles=BETWEEN)
-    plan = replace(between("rigidity_scale"), drive=forward)
+    plan = replace(between("rigidity_scale"), drive=tb.Rotation(direction="forward", drive_angles=BETWEEN))
     found = told(plan)
-    angles = np.delete(BETWEEN, 7)
-    without = information(plan.at_angles(angles)).bound_with_priors.values
+    without = information(plan.at_angles(np.delete(BETWEEN, 7))).bound_with_priors.values
     right = 1.0 - (found.bound_with_priors.values / without) ** 2
     np.testing.assert_allclose(found.leverage_on.values[7, :-1], right[:-1], rtol=0.0, atol=2e-5)
     np.testing.assert_allclose(found.leverage_on.values[-1, :3], 0.0, atol=1e-12)  # unloaded

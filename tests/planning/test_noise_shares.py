@@ -33,20 +33,17 @@ def known_indices():
     return np.array([of_one, of_two, 0.0]) / whole, np.array([of_one + both, of_two, both]) / whole
 
 
-SIZES = np.array([1.0, 2.0, 0.5])
-
-
-def functions(x):
-    """Ishigami's, and a linear one."""
-    return np.stack([ishigami(x), SIZES @ x])
-
-
 def test_indices_of_known_functions():
     """Means over 16 seeds, within 4.5 of their standard errors: 12 numbers, false alarms in less than 1 of 200 runs."""
-    laws = [stats.uniform(-np.pi, 2.0 * np.pi)] * 3
+    laws, slopes = [stats.uniform(-np.pi, 2.0 * np.pi)] * 3, np.array([1.0, 2.0, 0.5])
+
+    def functions(x):
+        """Ishigami's, and a linear one."""
+        return np.stack([ishigami(x), slopes @ x])
+
     found = np.array([first_and_total(functions, laws, 1024, seed) for seed in range(16)])
     mean, error = found.mean(axis=0), found.std(axis=0, ddof=1) / 4.0
-    linear = SIZES**2 / np.sum(SIZES**2)
+    linear = slopes**2 / np.sum(slopes**2)
     first, total = known_indices()
     right = np.array([[first, linear], [total, linear]])
     assert error.max() < 0.005
@@ -73,10 +70,9 @@ def test_shares_at_small_noise_are_those_of_first_order():
     assert list(found.source.values) == list(SOURCES)
     for error in ("along", "across"):
         gains = grown[f"gain_{error}"].values[:, where]
-        first, total = first_and_total(
-            gains.reshape(-1, 4).__matmul__, [stats.norm(0.0, size) for size in sizes], 64, 1
-        )
-        for name, right in (("share", first), ("total_share", total)):
+        noises = [stats.norm(0.0, size) for size in sizes]
+        indices = first_and_total(gains.reshape(-1, 4).__matmul__, noises, 64, 1)
+        for name, right in zip(("share", "total_share"), indices, strict=True):
             made = found[name].sel(error=error).values
             np.testing.assert_allclose(made, right.reshape(made.shape), rtol=0.0, atol=1e-3)
         # Root mean squares of 384 numbers of a scrambled sequence: within 4.5 standard errors of as many random ones.
@@ -88,10 +84,8 @@ def test_shares_at_small_noise_are_those_of_first_order():
 def test_shares_do_not_depend_on_the_unit():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=5e-6 * rod.force_unit, moment_noise=2e-6 * rod.moment_unit, drive_angle_noise=2e-6)
-    si = noise_shares(
-        Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod)), rng=1, samples=64, states=2, methods=("raw",)
-    )
-    plain = noise_shares(QUIET, rng=1, samples=64, states=2, methods=("raw",))
+    plans = (Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod)), QUIET)
+    si, plain = (noise_shares(plan, rng=1, samples=64, states=2, methods=("raw",)) for plan in plans)
     np.testing.assert_allclose(si.share.values, plain.share.values, rtol=0.0, atol=1e-4)
     np.testing.assert_allclose(si.rms_error.values, 0.2 * plain.rms_error.values, rtol=1e-4)
     assert si.rms_error.attrs["units"] == "m"
@@ -124,6 +118,17 @@ def test_places_are_evenly_within_the_sweeps():
     same, other = (noise_shares(QUIET, rng=seed, samples=4, states=6, methods=("raw",)).share for seed in (1, 2))
     np.testing.assert_array_equal(same.values, found.share.values)
     assert np.any(other.values != found.share.values)
+
+
+def test_shares_are_of_either_kind_of_drive():
+    shifts = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6)]
+    plan = Plan(tb.contours.Circle(0.3, 0.8), Rig(load_cell=tb.LoadCell(force_noise=0.005, moment_noise=0.002)), shifts)
+    shares = noise_shares(plan, rng=1, samples=16, states=4, methods=("raw",))
+    assert shares.sizes["sample"] == 8
+    assert np.all(shares.after_first_contact >= 0.0)
+    assert shares.after_first_contact.attrs["units"] == "1"
+    with refused(ParameterError, "noise_shares"):
+        noise_shares(replace(plan, drive=[tb.Rotation(), shifts[0]]), rng=1, samples=16)
 
 
 @pytest.mark.parametrize("samples", [1000, 1, 0, -4, 64.0, True, "64"])

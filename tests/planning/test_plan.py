@@ -54,16 +54,8 @@ def test_the_family_builds_the_contour_back_and_an_enlarged_one(name):
 
 def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
     bias, gain = (0.1, -0.2, 0.3), ((1.1, 0.0, 0.0), (0.0, 0.9, 0.1), (0.0, 0.0, 1.0))
-    encoder = {"drive_angle_offset": 0.05, "drive_angle_backlash": 0.02}
-    cell = replace(
-        CELL,
-        bias=bias,
-        gain=gain,
-        lever=(0.01, 0.02),
-        **encoder,
-        drive_angle_noise=0.01,
-        bias_uncertainty=(1.0, 1.0, 1.0),
-    )
+    encoder = {"drive_angle_offset": 0.05, "drive_angle_backlash": 0.02, "drive_angle_noise": 0.01}
+    cell = replace(CELL, bias=bias, gain=gain, lever=(0.01, 0.02), bias_uncertainty=(1.0, 1.0, 1.0), **encoder)
     plan = Plan(PROFILE, Rig(load_cell=cell), drive=tb.Rotation(drive_step=0.05))
     scanned = tb.scan(PROFILE, drive_step=0.05).record
     loads, read = (np.stack([r[name].values for name in CHANNELS]) for r in (scanned, plan.record))
@@ -77,9 +69,8 @@ def test_the_model_shows_the_record_at_the_point():
     """Contour as it is, rig as stated."""
     several = ("gain", "friction", "suspension_compliance", "length", "taper", "rest_curvature", "moment_curve")
     for unknown in ({}, {**NOTHING, **dict.fromkeys(several, "default")}):
-        plan = Plan(
-            PROFILE, Rig(load_cell=replace(CELL, frame="turning"), unknown=unknown), drive=tb.Rotation(drive_step=0.05)
-        )
+        rig = Rig(load_cell=replace(CELL, frame="turning"), unknown=unknown)
+        plan = Plan(PROFILE, rig, drive=tb.Rotation(drive_step=0.05))
         values = dict(zip(plan.model.names, plan.point, strict=True))
         assert (values["a"], values["q"], values["x_c"], values["noise_scale"]) == (0.5, 0.5, 0.0, 1.0)
         loads = plan.model.loads(plan.point[None])[0]
@@ -165,41 +156,33 @@ SHARED = {
 }
 
 
-def some_loads():
-    rng = np.random.default_rng(1)
-    return rng.normal(size=(SAMPLES, 3)), rng.normal(size=(SAMPLES, 3))
-
-
 def dense(cell, loads, by_angle):
     """Covariance of all readings, entry by entry, shape (samples · 3,) twice."""
     nu = cell.degrees_of_freedom
     widening = 1.0 if np.isinf(nu) else nu / (nu - 2.0)
-    m, x, y = cell.correlation
-    correlation = np.array([[1.0, m, x], [m, 1.0, y], [x, y, 1.0]])
     scale = np.hypot([cell.moment_noise, cell.force_noise, cell.force_noise], cell.relative_noise * loads)
     out = np.zeros((SAMPLES, 3, SAMPLES, 3))
     for i in range(SAMPLES):
-        out[i, :, i, :] = widening * np.outer(scale[i], scale[i]) * correlation
+        out[i, :, i, :] = widening * np.outer(scale[i], scale[i]) * cell.correlation_matrix
         out[i, :, i, :] += cell.drive_angle_noise**2 * np.outer(by_angle[i], by_angle[i])
-    for i in range(SAMPLES):
-        for j in range(SAMPLES):
-            for c in range(3):
-                shared = cell.bias_uncertainty[c] ** 2
-                size = 0.0 if cell.drift is None else cell.drift.moment if c == 0 else cell.drift.force
-                if isinstance(cell.drift, RandomWalk):
-                    shared += size**2 * min(i, j)
-                elif cell.drift is not None:
-                    shared += size**2 * np.exp(-abs(i - j) / cell.drift.time)
-                out[i, c, j, c] += shared
+    for i, j, c in np.ndindex(SAMPLES, SAMPLES, 3):
+        out[i, c, j, c] += cell.bias_uncertainty[c] ** 2
+        if cell.drift is not None:
+            size = cell.drift.force if c else cell.drift.moment
+            walks = isinstance(cell.drift, RandomWalk)
+            out[i, c, j, c] += size**2 * (min(i, j) if walks else np.exp(-abs(i - j) / cell.drift.time))
     return out.reshape(3 * SAMPLES, 3 * SAMPLES)
 
 
 @pytest.mark.parametrize("present", [(True, True, True), (True, False, True), (False, False, True)])
 @pytest.mark.parametrize("name", SHARED)
 def test_whitened_slopes_have_the_products_of_the_dense_covariance(name, present):
-    cell, (loads, by_angle) = SHARED[name], some_loads()
-    here = np.array(present)
-    slopes = np.random.default_rng(2).normal(size=(SAMPLES, 3, 4))
+    cell, here, rng = SHARED[name], np.array(present), np.random.default_rng(1)
+    loads, by_angle, slopes = (
+        rng.normal(size=(SAMPLES, 3)),
+        rng.normal(size=(SAMPLES, 3)),
+        rng.normal(size=(SAMPLES, 3, 4)),
+    )
     white = whitening(cell, loads, by_angle, here)(slopes)
     assert white.shape == (SAMPLES, here.sum(), 4)
     every = np.tile(here, SAMPLES)

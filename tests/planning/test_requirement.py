@@ -34,10 +34,7 @@ CELLS = {
 SHARED = [pytest.param(name, "gap", marks=pytest.mark.slow) for name in ("encoder", "bias", "drift")]
 
 
-@pytest.mark.parametrize(
-    ("name", "where"),
-    [("in proportion", "gap"), ("white", "touched"), pytest.param("white", "gap", marks=pytest.mark.slow), *SHARED],
-)
+@pytest.mark.parametrize(("name", "where"), [("in proportion", "gap"), ("white", "touched"), *SHARED])
 def test_a_load_cell_as_asked_for_gives_the_band_that_was_wanted(name, where):
     """Whatever else about it stays as it is."""
     plan = replace(PLAN, rig=Rig(load_cell=CELLS[name]))
@@ -50,12 +47,8 @@ def test_a_load_cell_as_asked_for_gives_the_band_that_was_wanted(name, where):
     assert better.force_noise == pytest.approx(factor * 0.05)
     got = information(replace(plan, rig=Rig(load_cell=better)))
     assert float(got[f"{where}_width"]) == pytest.approx(0.7 * present, rel=1e-4)
-
-
-def test_everywhere_is_the_mean_of_all_places():
-    found = information(PLAN)
-    needed = required_noise(PLAN, 0.01)
-    assert float(needed.present_width) == pytest.approx(2.0 * 1.959963985 * float(found.height_sd.mean()), rel=1e-6)
+    everywhere = float(required_noise(plan, present).present_width)  # the mean of all places
+    assert everywhere == pytest.approx(2.0 * 1.959963985 * float(information(plan).height_sd.mean()), rel=1e-6)
 
 
 def test_noise_is_in_proportion_to_the_band_where_priors_say_little():
@@ -131,9 +124,7 @@ def test_every_rod_has_the_band_and_the_strain_of_its_own_plan():
     plan = replace(METAL, rig=replace(METAL.rig, rod=tb.Rod.circular(0.17, 0.3e-3, 206e9)))
     of = found.sel(length=0.17, diameter=0.3e-3)
     assert float(of.strain) == pytest.approx(max(sweep.largest_strain for sweep in plan.scan.sweeps))
-    bounds = information(plan)
-    names = ["a", "q", "x_c"]
-    here = bounds.sel(parameter=names, parameter_=names)
+    here = information(plan).sel(parameter=["a", "q", "x_c"], parameter_=["a", "q", "x_c"])
     covariance = here.correlation.values * np.outer(here.bound_with_priors, here.bound_with_priors)
     slopes = np.stack([x**2, np.ones_like(x), -5.0 * x], axis=1)
     sd = np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes))
@@ -171,8 +162,6 @@ def test_where_no_rod_will_do_none_is_the_best_and_progress_is_reported(length, 
 
 
 MATERIAL = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
-
-
 BARE = (PLAN, *(replace(METAL, rig=replace(METAL.rig, **{name: None})) for name in ("load_cell", "rod")))
 
 
@@ -181,11 +170,9 @@ BARE = (PLAN, *(replace(METAL, rig=replace(METAL.rig, **{name: None})) for name 
     [
         *((plan, {}, ["rod", "SI", "load_cell"]) for plan in BARE),
         (METAL, {"lengths": []}, ["lengths"]),
-        (METAL, {"diameters": [0.0]}, ["diameters"]),
         (METAL, {"lengths": [-0.1]}, ["lengths"]),
-        (METAL, {"diameters": [np.nan]}, ["diameters"]),
+        (METAL, {"diameters": [0.0, np.nan]}, ["diameters"]),
         (METAL, {"elastic_strain": 0.0}, ["elastic_strain"]),
-        (METAL, {"elastic_strain": np.nan}, ["elastic_strain"]),
         (METAL, {"youngs_modulus": -1.0}, []),
     ],
 )

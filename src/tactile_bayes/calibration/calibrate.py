@@ -53,8 +53,8 @@ def calibrate(
 
     If a posterior is right, the rank of the truth among its draws is uniform, for every quantity (simulation-based
     calibration: Talts et al. 2018, arXiv:1804.06788), and bands, regions and intervals of 90 % hold in nine of ten
-    replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong. With a rig of
-    its own for the simulation (`truth`), the ranks show the effect on intervals of what inference assumes wrongly.
+    replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong; or, with a rig
+    of its own for the simulation (`truth`), they show the effect of what inference assumes wrongly.
 
     An error in a replicate does not end the run: the replicate is lost, and no claim holds in it;
     `calibration_replicate` repeats it alone. An interrupt ends the run.

@@ -30,8 +30,7 @@ def noticed_coverage(
 ) -> tuple[float, float]:
     """Return the coverages nearest to a stated one, below and above, that a test detects with the probability `power`.
 
-    The number of replicates in which a claim holds is binomial, and the coverages follow from that exactly. A claim
-    that holds at a share of the grid points is taken to hold at all or none of them, which has the largest variance.
+    A claim that holds at a share of the grid points is taken to hold at all or none of them, the largest variance.
     """
     held = np.arange(count + 1)
     is_fault = coverage_p_value(held / count, count, probability, is_whole=is_whole) <= level

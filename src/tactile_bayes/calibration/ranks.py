@@ -28,12 +28,10 @@ class NoticedRanks(NamedTuple):
 
 
 def uniformity_p_value(ranks: ArrayLike, top: int) -> float:
-    """Return the probability that uniform ranks, from 0 to `top`, are as far from uniform as these.
+    """Return the probability that uniform ranks, from 0 to `top`, are as far from uniform as these, shape (n,).
 
     At each rank the share of ranks up to it is binomial; the statistic is the least probable of these shares, as in
     simultaneous bands for empirical distributions (Säilynoja, Bürkner & Vehtari 2022, doi 10.1007/s11222-022-10090-6).
-
-    Shapes: ranks (n,).
     """
     below = np.cumsum(np.bincount(np.asarray(ranks, dtype=np.intp), minlength=top + 1))
     least, null = _least_probability(below[:-1], int(below[-1])), _null(int(below[-1]), top)
@@ -56,12 +54,7 @@ def simultaneous_band(count: int, top: int, probability: float) -> tuple[Floats,
 
 @lru_cache(maxsize=8)
 def noticed_ranks(count: int, top: int, level: float, power: float) -> NoticedRanks:
-    """Return the smallest errors of a normal posterior that the test of uniformity detects.
-
-    An error is detected if `uniformity_p_value` is at most `level` with probability `power`. That probability is
-    computed without simulation (see `_power`); the critical value is that of the simulated uniform ranks, as in the
-    test.
-    """
+    """Return the errors of a normal posterior from which on `uniformity_p_value` is at most `level` so often."""
 
     def smallest(shift: float, log_scale: float) -> float:
         """Return the smallest detected error on the line from no error to the farthest."""
@@ -71,19 +64,15 @@ def noticed_ranks(count: int, top: int, level: float, power: float) -> NoticedRa
             return _power(count, probabilities, level) - power
 
         farthest = max(abs(shift), abs(log_scale))
-        if excess(1.0) < 0.0:
-            return np.nan
-        return farthest * float(brentq(excess, 0.0, 1.0, xtol=_TOLERANCE / farthest))
+        return farthest * brentq(excess, 0.0, 1.0, xtol=_TOLERANCE / farthest) if excess(1.0) >= 0.0 else np.nan
 
     factor = float(np.log(_FARTHEST))
-    found = smallest(_FARTHEST, 0.0), *np.exp([smallest(0.0, factor), smallest(0.0, -factor)]).tolist()
-    return NoticedRanks(*found)
+    return NoticedRanks(smallest(_FARTHEST, 0.0), *np.exp([smallest(0.0, factor), smallest(0.0, -factor)]).tolist())
 
 
 def _rank_probabilities(top: int, shift: float, scale: float) -> Floats:
-    """Return the probabilities of the ranks 0, 1, …, top of truths among standard normal draws, shape (top + 1,).
+    """Return the probabilities of ranks of truths z ~ N(shift, scale²) among standard normal draws, shape (top + 1,).
 
-    Truths are z ~ N(shift, scale²).
     P(rank = r) = E[C(top, r) Φ(z)ʳ (1 − Φ(z))ᵗᵒᵖ⁻ʳ], by the trapezoidal rule.
     """
     t = np.linspace(-8.0, 8.0, 1601)[:, None]
@@ -144,4 +133,4 @@ def _null(count: int, top: int) -> Floats:
     for _ in range(_SIMULATIONS // _BLOCK_SIZE):
         counts = rng.multinomial(count, np.full(top + 1, 1.0 / (top + 1)), size=_BLOCK_SIZE)
         parts.append(_least_probability(np.cumsum(counts, axis=1)[:, :-1], count))
-    return np.sort(np.concatenate(parts))
+    return np.sort(parts, axis=None)

@@ -19,9 +19,8 @@ _NOISES = ("force_noise", "moment_noise", "relative_noise")
 def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, float]) -> dict[str, float]:
     """Return the true values of parameters by name, those drawn first, relative to the rod and load cell assumed.
 
-    What has no true value is left out: the noise scale if channels differ, the noise of a load cell that states none,
-    the length of a discrepancy that the simulated rig does not have, the modes of a trace if the rod is not what it
-    says, and parameters of another family.
+    Left out is what has none: a noise scale if channels differ, noise of a cell that states none, the length of a
+    discrepancy that is not simulated, modes of a trace if the rod is not what it says, parameters of another family.
     """
     known = {**simulated.own_family.known, **simulated.unknowns.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)
@@ -40,9 +39,9 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     times = {**_ratios(cell, stated_cell), "rigidity_scale": rod.flexural_rigidity / stated.flexural_rigidity}
     found = {}
     for name in dict.fromkeys((*drawn, *assumed.priors)):
-        value = values.get(name, _neutral(name))
-        if value is not None and math.isfinite(times.get(name, 1.0)):
-            found[name] = times.get(name, 1.0) * (value + more.get(name, 0.0))
+        value, factor = values.get(name, _neutral(name)), times.get(name, 1.0)
+        if value is not None and math.isfinite(factor):
+            found[name] = factor * (value + more.get(name, 0.0))
     return found
 
 

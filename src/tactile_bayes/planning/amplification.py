@@ -19,7 +19,7 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
 )
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.mechanics.rods.surface import Surface
-from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.plan import SAMPLE_COLUMNS, Plan
 from tactile_bayes.record import CHANNELS, COLUMNS, carried_sweeps, travel_unit, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
 from tactile_bayes.rig.stated import cell_with
@@ -29,7 +29,6 @@ Method = Literal["raw", "constrained"]
 METHODS: tuple[Method, ...] = ("raw", "constrained")
 SOURCES = (*CHANNELS, "drive_angle")
 
-COLUMNS_OF_SAMPLES = ["sweep", "direction", "base_x", "base_y", "drive_angle"]
 _TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_phase")
 
 # Default distances of samples from first contact and from snap-off, over the sweep's length.
@@ -98,7 +97,7 @@ def contact_errors(plan: Plan) -> xr.Dataset:
     holds = [plan.reconstruct(plan.record, method).status.values[loaded] == "ok" for method in METHODS]
     return xr.Dataset(
         {
-            **chosen[COLUMNS_OF_SAMPLES].data_vars,
+            **chosen[SAMPLE_COLUMNS].data_vars,
             **{name: chosen[f"truth_{name}"] for name in _TRUTHS},
             **{name: ("sample", far, {"units": travel_unit(record)}) for name, far in distances.items()},
             **variables,

@@ -95,9 +95,6 @@ def design(
 ) -> xr.Dataset:
     """Return the expected results of the next record for every candidate drive, and the best candidate.
 
-    Objects are drawn from the prior or the posterior so far; the information of the next record about each is added to
-    it, and the resulting band is averaged.
-
     Parameters
     ----------
     known : xr.DataTree, str or Family
@@ -112,8 +109,7 @@ def design(
         Candidates; each sequence is one, whose sweeps are one record. Rotations without a grid of their own go from
         −30° to 210° in steps of 2°, and drives that carry the base have as many samples. By default `usual_drives`.
     criterion : {"band", "gap", "information"} or Criterion
-        Criterion of the best candidate: the narrowest band, the smallest gap, or the most information. A `Criterion`
-        also states where the band matters, and its probability.
+        Criterion of the best candidate; a `Criterion` also states where the band matters, and its probability.
     nested : bool
         Whether each candidate's posteriors are also sampled by nested Monte Carlo, which checks Laplace's
         approximation, and includes the information of the snap-off.
@@ -163,9 +159,10 @@ def design(
 
     Notes
     -----
-    To first order, the precision of a posterior is the prior precision plus Fisher's information of the record
-    (Laplace's approximation). The width of the band is averaged over objects, and so is the gain in information,
-    half the change of the logarithmic determinant (Lindley 1956; Long et al. 2013, doi 10.1016/j.cma.2013.02.017).
+    Objects are drawn from the prior or the posterior so far. To first order, the precision of the next posterior of
+    each is the present one plus Fisher's information of the record (Laplace's approximation). The width of the band is
+    averaged over objects, and so is the gain in information, half the change of the logarithmic determinant (Lindley
+    1956; Long et al. 2013, doi 10.1016/j.cma.2013.02.017).
     Nested Monte Carlo simulates a record of each object, and samples its posterior from a t distribution about the mode
     (Ryan 2003; Beck et al. 2018, doi 10.1016/j.cma.2018.01.053).
 

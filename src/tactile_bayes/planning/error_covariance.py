@@ -43,16 +43,13 @@ def whitening(
     covariance = cell.covariance(loads)
     covariance += cell.drive_angle_deviation**2 * by_angle[:, :, None] * by_angle[:, None, :]
     wandering = wandering_deviation(cell, samples)
-    shared = bool(np.any(wandering[:, present])) or discrepancy is not None
-    index = np.arange(3)
-    if not shared:
+    if discrepancy is None and not np.any(wandering[:, present]):
         chosen = covariance[:, present][:, :, present]
         return NoiseWhitening(present, np.asarray(np.linalg.inv(np.linalg.cholesky(chosen))), None)
+    channels, index = int(present.sum()), np.arange(3)
     covariance[:, index, index] -= wandering**2
-    chosen = covariance[:, present][:, :, present]
-    channels = int(present.sum())
     whole = np.zeros((samples, channels, samples, channels))
-    whole[np.arange(samples), :, np.arange(samples), :] = chosen
+    whole[np.arange(samples), :, np.arange(samples), :] = covariance[:, present][:, :, present]
     sums = _wandering(cell, samples)[..., present]
     if discrepancy is not None:
         sums += discrepancy.covariance()[..., present]

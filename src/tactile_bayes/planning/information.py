@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.contour_groups import unit_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
-from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.plan import SAMPLE_COLUMNS, Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
 from tactile_bayes.record import CHANNELS, COLUMNS
 
@@ -26,15 +26,14 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     matrix = whole.matrix
     covariance = _inverse(matrix + prior)
     deviation = np.sqrt(np.diag(covariance))
-    rows = whole.slopes.reshape(-1, point.size)
     # The diagonal of the hat matrix of a linear model: its sum counts the parameters that the record determines.
     leverage = np.einsum("nci,ij,ncj->nc", whole.slopes, covariance, whole.slopes)
-    of_channels: dict[str, list[Floats]] = {"alone": [], "without": []}
-    for channel in range(len(CHANNELS)):
-        only = np.arange(len(CHANNELS)) == channel
-        for kind, chosen in (("alone", only), ("without", ~only)):
-            part = record_information(model, point, chosen, slopes=plan.reading_slopes).matrix + prior
-            of_channels[kind].append(np.sqrt(np.diag(_inverse(part))))
+
+    def bound_of(channels: Flags) -> Floats:
+        part = record_information(model, point, channels, slopes=plan.reading_slopes).matrix
+        return np.sqrt(np.diag(_inverse(part + prior)))
+
+    each_channel = np.eye(len(CHANNELS), dtype=bool)
     intervals = stretches(plan.scan)
     x = np.concatenate([stretch.x for stretch in intervals])
     names = np.repeat([stretch.name for stretch in intervals], [stretch.x.size for stretch in intervals])
@@ -46,7 +45,6 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     }
     units = [unit_of(model, name) for name in model.names]
     length = {"units": COLUMNS["base_x"].unit_in(plan.record.attrs["units"])}
-    columns = ("sweep", "direction", "drive_angle", "base_x", "base_y")
     present = [name for name, there in zip(CHANNELS, model.present, strict=True) if there]
     return xr.Dataset(
         {
@@ -56,15 +54,15 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
             "bound_if_rest_known": ("parameter", 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))),
             "prior_sd": ("parameter", np.array([float(model.priors[name].std()) for name in model.names])),
             "correlation": (("parameter", "parameter_"), covariance / np.outer(deviation, deviation)),
-            "bound_of_channel": (("channel", "parameter"), np.array(of_channels["alone"])),
-            "bound_without_channel": (("channel", "parameter"), np.array(of_channels["without"])),
+            "bound_of_channel": (("channel", "parameter"), np.array([bound_of(own) for own in each_channel])),
+            "bound_without_channel": (("channel", "parameter"), np.array([bound_of(~own) for own in each_channel])),
             "leverage": (("sample", "channel"), leverage),
             "leverage_on": (("sample", "parameter"), _leverage_on(whole.slopes, covariance)),
             "stretch": ("x", names),
             "height": ("x", np.asarray(plan.contour.height(x)), length),
             "height_sd": ("x", spread, length),
             **{name: ((), value, length) for name, value in widths.items()},
-            **{name: ("sample", plan.record[name].values, plan.record[name].attrs) for name in columns},
+            **plan.record[SAMPLE_COLUMNS].data_vars,
         },
         coords={
             "parameter": list(model.names),
@@ -76,7 +74,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
         attrs={
             "family": plan.experiment.own_family.name,
             "probability": probability,
-            "readings": int(rows.shape[0]),
+            "readings": leverage.size,
             "leverage_sum": float(leverage.sum()),
         },
     )
@@ -84,14 +82,11 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
 
 def _leverage_on(slopes: Floats, covariance: Floats) -> Floats:
     """Return the share of each parameter's precision that is lost without each sample, shape (samples, d)."""
-    variance = np.diag(covariance)
     pulled = slopes @ covariance  # (samples, channels, d)
-    channels = slopes.shape[1]
-    hat = np.einsum("nci,nki->nck", pulled, slopes)
     # The variance without a sample is larger by vᵀ (1 − H)⁻¹ v (Sherman, Morrison and Woodbury).
-    left = np.eye(channels) - hat
+    left = np.eye(slopes.shape[1]) - np.einsum("nci,nki->nck", pulled, slopes)
     more = np.einsum("nci,nci->ni", pulled, np.linalg.solve(left, pulled))
-    return np.asarray(more / (variance + more))
+    return np.asarray(more / (np.diag(covariance) + more))
 
 
 def _inverse(matrix: Floats) -> Floats:

@@ -15,7 +15,6 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import (
-    COLUMNS_OF_SAMPLES,
     METHODS,
     SOURCES,
     Method,
@@ -24,7 +23,7 @@ from tactile_bayes.planning.amplification import (
     even_shares,
     event_distances,
 )
-from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.plan import SAMPLE_COLUMNS, Plan
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import COLUMNS, carried_sweeps, travel_unit, travels_of
 
@@ -39,10 +38,7 @@ def noise_shares(
 
     The noises of the three channels and of the encoder are independent, and the error is that of `reconstruct`, however
     nonlinear. To first order every share is gain² σ² over the sum of these, and shares sum to one; a smaller sum comes
-    from interactions of noises, and measures the deviation from first order.
-
-    The estimators are those of Saltelli et al. (2010) with scrambled Sobol' sequences, as in
-    `scipy.stats.sobol_indices`.
+    from interactions of noises. The estimators are those of `scipy.stats.sobol_indices`.
     """
     if check_whole_number("samples", samples, 2, "give a power of two, like 1024") & (samples - 1):
         raise ParameterError(f"samples is {samples!r}: give a power of two, like 1024")
@@ -78,7 +74,7 @@ def noise_shares(
     distances = event_distances(plan, chosen.sweep.values, chosen.travel.values)
     return xr.Dataset(
         {
-            **chosen[COLUMNS_OF_SAMPLES].data_vars,
+            **chosen[SAMPLE_COLUMNS].data_vars,
             "contact_phase": ("sample", chosen.truth_contact_phase.values),
             **{name: ("sample", far, along) for name, far in distances.items()},
             "share": ((*dims, "source"), first),

@@ -32,6 +32,8 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.sweep import Drive, Rotation, Scan, drives_of, scan
 
+SAMPLE_COLUMNS = ["sweep", "direction", "base_x", "base_y", "drive_angle"]  # columns of a record that results repeat
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -74,8 +76,7 @@ class Plan:
         drives_of(self.drive)
         self._refuse_other_family()
         deviations = self.cell.standard_deviations
-        silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]
-        if silent:
+        if silent := [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]:
             raise ParameterError(
                 f"the load cell states no finite noise of {', '.join(silent)}: without it errors are "
                 "unknown; give LoadCell(force_noise=..., moment_noise=...), from its data sheet, or from_zero_load"
@@ -124,9 +125,8 @@ class Plan:
     def at_angles(self, drive_angles: ArrayLike) -> Plan:
         """Return the plan with other drive angles of all rotations."""
         angles: dict[str, Any] = {"drive_step": None, "drive_angles": drive_angles}
-        return replace(
-            self, drive=[replace(one, **angles) if isinstance(one, Rotation) else one for one in self.drives]
-        )
+        drives = [replace(one, **angles) if isinstance(one, Rotation) else one for one in self.drives]
+        return replace(self, drive=drives)
 
     @cached_property
     def record(self) -> xr.Dataset:
@@ -174,8 +174,6 @@ class Plan:
 
     def with_noise(self, factor: float) -> Plan:
         """Return the plan with force_noise and moment_noise of the load cell multiplied by a factor."""
-        check_positive("factor", factor)
-        noisier = replace(
-            self.cell, force_noise=factor * self.cell.force_noise, moment_noise=factor * self.cell.moment_noise
-        )
-        return replace(self, rig=replace(self.rig, load_cell=noisier))
+        factor = check_positive("factor", factor)
+        louder = {name: factor * getattr(self.cell, name) for name in ("force_noise", "moment_noise")}
+        return replace(self, rig=replace(self.rig, load_cell=replace(self.cell, **louder)))

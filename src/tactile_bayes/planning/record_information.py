@@ -78,12 +78,8 @@ def record_information(
     """Return the expected (Fisher) information at a point of the model's parameters.
 
     For normal errors it is JᵀΣ⁻¹J, with J the derivatives of the readings; for Student's t with ν degrees of freedom it
-    is smaller by (ν + 1)/(ν + 3), with Σ of the scale in place of the standard deviation. The snap-off also excludes
-    contours: that has no derivative and is not counted. The dependence of noise on the loads, and information about a
-    discrepancy, are not counted either, and the information about the noise scale is that of white noise, which is too
-    large with drift, encoder noise or a discrepancy.
-
-    Shapes: point (d,), channels (3,).
+    is smaller by (ν + 1)/(ν + 3), with Σ of the scale. Not counted are what the snap-off excludes, the dependence of
+    noise on loads, and a discrepancy; that about the noise scale is of white noise. Shapes: point (d,), channels (3,).
     """
     cell = model.likelihood.load_cell if load_cell is None else load_cell.dimensionless(model.likelihood.rod)
     cell = scaled_cell(cell, model.noise_scale(point[None])[0])

@@ -22,14 +22,15 @@ def sensitivity_summary(tree: xr.DataTree, si: bool) -> Iterator[str]:
             if not ok.any():
                 yield f"First order holds for no {method} contact point at this noise."
                 continue
-            along, across = (
-                _length(float(np.quantile(of[name].values[ok], 0.5, weights=weight[ok], method="inverted_cdf")), si)
+            medians = (
+                np.quantile(of[name].values[ok], 0.5, weights=weight[ok], method="inverted_cdf")
                 for name in ("sd_along", "sd_across")
             )
+            along, across = (_length(float(median), si) for median in medians)
+            share = weight[ok].sum() / weight.sum()
             yield (
                 f"A {method} contact point is off by {along} along the contour and {across} across it (medians of "
-                "standard deviations), where first order holds: over "
-                f"{weight[ok].sum() / weight.sum():.0%} of the sweep."
+                f"standard deviations), where first order holds: over {share:.0%} of the sweep."
             )
         raw = grown.sel(reconstruction="raw")
         powers = raw.growth_across.sel(event="first contact").values
@@ -50,12 +51,8 @@ def sensitivity_summary(tree: xr.DataTree, si: bool) -> Iterator[str]:
             )
     if "information" in tree:
         found = tree["information"].to_dataset()
-        kinds = [("touched", "where the contour is touched"), ("gap", "in the gap")]
-        parts = [
-            f"{_length(float(found[f'{kind}_width']), si)} {part}"
-            for kind, part in kinds
-            if np.isfinite(float(found[f"{kind}_width"]))
-        ]
+        widths = {"where the contour is touched": float(found.touched_width), "in the gap": float(found.gap_width)}
+        parts = [f"{_length(width, si)} {where}" for where, width in widths.items() if np.isfinite(width)]
         yield f"The expected width of the {found.attrs['probability']:.0%} band is {' and '.join(parts)}."
         lost = found.bound_without_channel.values / found.bound_with_priors.values
         own = [i for i, name in enumerate(found.parameter.values) if str(name) != "noise_scale"]
@@ -67,13 +64,12 @@ def sensitivity_summary(tree: xr.DataTree, si: bool) -> Iterator[str]:
         )
     if "required_noise" in tree:
         needed = tree["required_noise"].to_dataset()
-        for width, force, moment in zip(
-            needed.band_width.values, needed.force_noise.values, needed.moment_noise.values, strict=True
-        ):
-            if np.isfinite(force):
-                yield f"A mean band of {_length(float(width), si)} needs {_noise(float(force), float(moment), si)}."
-            else:
-                yield f"A mean band of {_length(float(width), si)} follows from the priors without any record."
+        columns = (needed[name].values.tolist() for name in ("band_width", "force_noise", "moment_noise"))
+        for width, force, moment in zip(*columns, strict=True):
+            how = f"needs {_noise(force, moment, si)}"
+            if not np.isfinite(force):
+                how = "follows from the priors without any record"
+            yield f"A mean band of {_length(width, si)} {how}."
 
 
 def _spacing(grown: xr.Dataset) -> Floats:
