@@ -56,8 +56,8 @@ def calibrate(
     replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong; or, with a rig
     of its own for the simulation (`truth`), they show the effect of what inference assumes wrongly.
 
-    An error in a replicate does not end the run: the replicate is lost, and no claim holds in it;
-    `calibration_replicate` repeats it alone. An interrupt ends the run.
+    An error in a replicate does not end the run: the replicate is lost, its message is the error, and no claim holds in
+    it; `calibration_replicate` repeats it alone. An interrupt ends the run.
 
     Parameters
     ----------
@@ -75,15 +75,12 @@ def calibrate(
         default every 2° from −30° to 210°, and as many samples where the base is carried.
     settings : SamplerSettings, optional
         By default 2 ensembles of 20 walkers, or two more than twice the parameters if that is larger, until R̂ is
-        below 1.05 and the effective draws number 200, five for every walker, in 500 steps at most; if they do not
-        converge, a second run with as many walkers as `infer_contour` has, in 6000 steps at most. Runs that end
-        unconverged are counted.
+        below 1.05 and the effective draws number 200, in 500 steps at most; if they do not converge, a second run with
+        the walkers of `infer_contour`, in 6000 steps at most. Runs that end unconverged are counted.
     truth : Rig or Misspecification, optional
-        The rig from which records are simulated, if it is another than inference assumes: it has the numbers of its
-        `unknown`, the distributions are drawn, and what is not named has the default distribution of a real rig. Its
-        rod and load cell, where it states them, take the place of those of `rig`. The true value of an inferred
-        parameter is that of the simulated rig relative to what `rig` states. A `Misspecification` has differences that
-        no rig can state, and a rig if it differs too.
+        The rig from which records are simulated, if it is another than inference assumes; its rod and load cell, where
+        it states them, take the place of those of `rig`. The true value of an inferred parameter is that of the
+        simulated rig relative to what `rig` states. A `Misspecification` has differences that no rig can state, too.
     out : path-like, optional
         Folder of the results store replicates.json: a run that was killed resumes, and one with more replicates
         begins with those that are stored.
@@ -102,17 +99,15 @@ def calibrate(
             Probability that uniform ranks are as far from uniform, by simultaneous bands of their distribution
             (Säilynoja et al. 2022, doi 10.1007/s11222-022-10090-6).
         coverage, coverage_error, coverage_replicates (claim)
-            Share of the replicates in which a claim holds, its standard error, and the number of replicates: pointwise
-            and simultaneous bands of the contour in the gap and beside it, contact regions, the predicted angle of
-            snap-off. A claim holds in no replicate that is lost.
+            Share of the replicates in which a claim holds, its standard error, and their number: pointwise and
+            simultaneous bands in the gap and beside it, contact regions, the predicted angle of snap-off.
         noticed_below, noticed_above (claim)
             Coverages below and above the stated one that would have been detected as faults with the probability
             ``power``, by the binomial distribution; NaN if there is none.
         pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
         median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,
         effective_draws, evaluations, seconds, message, traceback (replicate)
-            Results of each replicate; misfit_probability and axial_score, of single samples, only with a `truth`. The
-            message of a replicate that is lost is its error, and only it has a traceback.
+            Results of each replicate; misfit_probability and axial_score, of single samples, only with a `truth`.
 
         Attributes: verdict, a text; conclusion, "calibrated", "not calibrated", "undecided" (more than 1 % of the
         replicates are lost, or more than 5 % did not converge) or "too few"; calibrated (0 or 1); lost and
@@ -140,10 +135,10 @@ def calibrate(
     >>> found.attrs["verdict"].partition(":")[0]
     'Too few replicates to judge'
     """
-    check_whole_number("replicates", replicates, 1)
+    replicates = check_whole_number("replicates", replicates, 1)
     experiment = experiment_of(family, rig, rng=rng, drive=drive, settings=settings, truth=truth)
     with open_results_store(experiment.identity, out, REPLICATES) as store:
-        kept = keep_outcomes(store, replicate, experiment, int(replicates), workers=workers)
+        kept = keep_outcomes(store, replicate, experiment, replicates, workers=workers)
     return summary(experiment.identity, experiment.probability, kept)
 
 

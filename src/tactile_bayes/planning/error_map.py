@@ -130,7 +130,7 @@ def error_map(
         rms_along, rms_across (…, reconstruction)
             Root mean square errors of contact points along and across the contour, for samples with the status "ok".
         first_order_along, first_order_across (…, reconstruction)
-            Predictions of `amplification` for the same samples.
+            Predictions of these errors by their amplification, to first order.
         median_error (…, reconstruction)
             Median distance of contact points from the true ones, for all samples that have an answer.
         without_answer, ok (…, reconstruction)

@@ -6,12 +6,7 @@ from collections.abc import Callable, Sequence
 
 import xarray as xr
 
-from tactile_bayes.checks import (
-    check_names,
-    check_probability,
-    check_whole_number,
-    refused,
-)
+from tactile_bayes.checks import check_names, check_probability, check_whole_number, refused
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -69,16 +64,13 @@ def sensitivity(
         With the groups
 
         amplification
-            Errors of single contacts by errors of each reading along the sweep, to first order: see
-            `tactile_bayes.planning.amplification.amplification`.
+            Errors of single contacts by errors of each reading along the sweep, to first order.
         information
-            Bounds on every parameter and on the contour, and the contributions of readings: see
-            `tactile_bayes.planning.information.information`.
+            Bounds on every parameter and on the contour, and the contributions of readings.
         noise_shares
-            Sobol' indices: shares of the readings' noises, beyond first order: see
-            `tactile_bayes.planning.noise_shares.noise_shares`.
+            Sobol' indices: shares of the readings' noises, beyond first order.
         required_noise
-            Noise that a band of given width requires: see `tactile_bayes.planning.requirement.required_noise`.
+            Noise that a band of given width requires, as from `tactile_bayes.planning.required_noise`.
 
         Attribute words: a summary in sentences.
 
