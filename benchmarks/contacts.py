@@ -26,11 +26,7 @@ CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 METHODS = ("raw", "constrained")
 PROBABILITIES = (0.5, 0.9, 0.95)
 PHASES = ("tip", "tangential")
-PLACES = {
-    "first 5 % of the sweep": (0.0, 0.05),
-    "in between": (0.05, 0.95),
-    "last 5 % before snap-off": (0.95, 1.0),
-}
+PLACES = {"first 5 % of the sweep": (0.0, 0.05), "in between": (0.05, 0.95), "last 5 % before snap-off": (0.95, 1.0)}
 SAMPLES = {"first 5 % of the sweep": 4, "in between": 12, "last 5 % before snap-off": 4}  # contacts taken of each sweep
 
 
