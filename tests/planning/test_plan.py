@@ -11,7 +11,6 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, paper_profile
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.experiment import usual_load_cell
 from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.error_covariance import whitening
@@ -33,8 +32,6 @@ CONTOURS = {
     "circle/ellipse": Joined(Circle(0.3, 0.4, 0.1), Ellipse(0.6, 0.2, 0.4, 0.1)),
 }
 
-# ---- family and parameters
-
 
 @pytest.mark.parametrize("name", CONTOURS)
 def test_the_family_builds_the_contour_back_and_an_enlarged_one(name):
@@ -47,9 +44,6 @@ def test_the_family_builds_the_contour_back_and_an_enlarged_one(name):
     for factor in (0.2, 3.0):
         larger = enlarged(contour, factor)
         np.testing.assert_allclose(larger.height(factor * X), factor * contour.height(X), rtol=1e-12)
-
-
-# ---- plans
 
 
 def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
@@ -105,11 +99,10 @@ def test_noise_grows_by_a_factor_and_nothing_else():
 
 def test_without_a_load_cell_there_is_the_usual_one():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
-    assert Plan(PROFILE).cell == tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-    usual = usual_load_cell(rod)
+    assert Plan(PROFILE).cell == CELL
+    usual = Plan(Parabola(2.5, 0.1), Rig(rod=rod)).cell
     assert (usual.force_noise, usual.moment_noise) == pytest.approx((0.05 * 0.05, 0.02 * 0.01))
     assert usual.dimensionless(rod).entries() == pytest.approx({"force_noise": 0.05, "moment_noise": 0.02})
-    assert Plan(Parabola(2.5, 0.1), Rig(rod=rod)).cell == usual_load_cell(rod)
 
 
 NO_FAMILY = tb.contours.from_points(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21) ** 2 + 0.5)
@@ -140,8 +133,6 @@ def test_what_does_not_go_together_is_refused(options, named):
     with refused(ParameterError, *named):
         _ = Plan(**({"contour": PROFILE} | options)).model
 
-
-# ---- covariance over a whole record
 
 SAMPLES = 7
 SHARED = {
