@@ -1,14 +1,11 @@
 """Prints the coverage of bands if the rig differs from what inference assumes, its detection, and its correction.
 
-Every row is a calibration: parabolas are drawn from the default prior, swept, measured and inferred as `infer` does by
-default, and their bands are compared with the truth. Noise is as stated; other unknowns of the rig are drawn
-from their default priors. An indented row repeats the case above it with other arguments of inference. If the default
-infers the property that is wrong, everything is taken as stated instead; otherwise the row names the
-property that is inferred, or stated, in correction. Replicates are kept in results/misspecification, from which a
-stopped run resumes.
+Every row is a calibration with the defaults of `infer`, except that noise is as stated. An indented row repeats the
+case above it with other arguments of inference: if the default infers the property that is wrong, everything is taken
+as stated; otherwise the row names what is inferred, or stated, in correction. Replicates are kept in
+results/misspecification, from which a stopped run resumes.
 
-With --discrepancy, the rows are those of the rigs without correction, each without and with a discrepancy, which is
-inferred beside all else.
+With --discrepancy, the rows are those of the rigs without correction, each without and with a discrepancy.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
 """Prints effective draws of one posterior per second and per evaluation, by this package and other samplers.
 
 The posterior is the demonstration's: a parabola's three parameters and the factor on the load cell's noise. Every
-sampler is given the very same log-probability, the same starts, one processor core, and the same number of
-evaluations, in four independent runs of which the second half counts. Points that a sampler wants at once are computed
-at once. Times are the processor's. Effective sample size is that of the bulk, of the worst parameter, by arviz-stats
-over four chains; the chain of a run with many walkers is walker-major. Peers are not dependencies of this package:
-`make samplers` puts them in a folder of their own.
-
-dynesty, which makes weighted draws and no chains, has no such number and is not in the table.
+sampler is given the same log-probability, starts, processor core and number of evaluations, in four independent runs of
+which the second half counts. Times are the processor's. Effective sample size is that of the bulk, of the worst
+parameter, by arviz-stats over four chains; the chain of a run with many walkers is walker-major. Peers are not
+dependencies of this package: `make samplers` puts them in a folder of their own.
 """
 
 from __future__ import annotations

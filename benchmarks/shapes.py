@@ -2,7 +2,6 @@
 
 The truths are not drawn from the prior: parabola, circle, ellipse, x⁴, profile IV of Merker et al. 2018, whose radius
 of curvature jumps, a rounded corner whose radius varies a hundredfold, and a contour through points that scatter.
-Pivots and noise are drawn anew for every record, and everything that is not known of the rig by default is inferred.
 """
 
 from __future__ import annotations

@@ -1,17 +1,13 @@
 """Prints how far the posterior of a growing record can be trusted, how late it is, and what a stopping rule saves.
 
-Parabolas and rigs are drawn from the default priors of `infer`, swept forward and backward in steps of 2° and measured,
-as in `benchmarks.calibration`. `tb.Stream` takes each record in blocks. At a quarter, half, three quarters and all of
+`tb.Stream` takes records as those of `benchmarks.calibration` in blocks. At a quarter, half, three quarters and all of
 it the truth has a rank among draws, and the band of 95 % is compared with it at nine positions within 0.1 L of the
-vertex, all of them at once. The last update is compared with the posterior that `infer_contour` has of the whole
-record. A rule asks for a band that is nowhere wider than a tolerance. Records are kept in results/stream, from which a
-stopped run resumes.
+vertex at once. The last update is compared with `infer_contour` of the whole record. A rule asks for a band that is
+nowhere wider than a tolerance. Records are kept in results/stream, from which a stopped run resumes.
 
-    python -m benchmarks.stream [RECORDS]
-    python -m benchmarks.stream --wrong [RECORDS]
+    python -m benchmarks.stream [--wrong] [RECORDS]
 
-With --wrong, each record is of a rig or a shape that the model does not have, one of several, and its e-values are
-printed beside those of right models.
+With --wrong, records are of rigs or shapes that the model does not have, and their e-values are printed.
 """
 
 from __future__ import annotations

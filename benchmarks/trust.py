@@ -1,11 +1,9 @@
 """Prints how often the conclusion of `tb.trust` is right, over simulated records of right and of wrong rigs.
 
-Every row is one of the cases of `benchmarks.misspecification`: a parabola is drawn from the default prior, swept,
-measured and inferred as in that table, and `trust` judges the posterior, without replicates, which test the computation
-alone. A band of 95 % is compared with the truth: in the gap and beside it at grid points, and as a whole. Of a record
-that the check finds not described, `tb.causes` names what is wrong: counted is how often the true cause comes first,
-and among the first two. The last rows count all records. Records are kept in results/trust, from which a stopped run
-resumes.
+Every row is one of the cases of `benchmarks.misspecification`: `trust` judges each posterior, without replicates, which
+test the computation alone. A band of 95 % is compared with the truth: in the gap and beside it at grid points, and as a
+whole. Of a record that the check finds not described, `tb.causes` names what is wrong: counted is how often the true
+cause comes first, and among the first two. The last rows count all records, which are kept in results/trust.
 """
 
 from __future__ import annotations

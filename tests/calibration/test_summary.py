@@ -205,14 +205,11 @@ def test_nothing_but_failures():
 
 
 @pytest.mark.parametrize(("count", "conclusion"), [(5, "calibrated"), (6, "undecided")])
-def test_too_many_that_did_not_converge_are_no_calibration(count, conclusion):
+def test_too_many_that_did_not_converge_are_no_calibration_and_alarms_are_counted(count, conclusion):
     unconverged = replicates(100, numbers={"converged": 0.0})
     found = summed(replicates(100) | {number: unconverged[number] for number in range(count)})
     assert (found.attrs["conclusion"], found.attrs["not_converged"]) == (conclusion, count)
     assert f" {count} did not converge" in found.attrs["verdict"]
-
-
-def test_alarms_of_the_check_are_counted():
     assert "alarm in 100.0% of 20" in judged(20, numbers={"check_passed": 0.0}).attrs["verdict"]
 
 

@@ -106,22 +106,17 @@ def test_without_a_load_cell_there_is_the_usual_one():
 
 
 NO_FAMILY = tb.contours.from_points(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21) ** 2 + 0.5)
-COSH = tb.contours.from_function(lambda x: np.cosh(x) - 0.5, (-1.0, 1.0))
 
 
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        ({"contour": NO_FAMILY}, ["family"]),
-        ({"contour": COSH}, ["power law"]),
+        ({"contour": NO_FAMILY}, ["family", "power law"]),
         ({"contour": Parabola([0.5, 0.6], 0.5)}, ["one contour"]),
         ({"contour": "II"}, ["'II'"]),
-        ({"contour": None}, ["None"]),
         ({"rig": Rig(load_cell=tb.LoadCell(force_noise=0.05))}, ["holding_moment", "LoadCell"]),
-        ({"rig": Rig(load_cell=tb.LoadCell(moment_noise=0.02))}, ["force_x, force_y", "LoadCell"]),
         ({"rig": Rig(load_cell=tb.LoadCell())}, ["holding_moment, force_x, force_y", "LoadCell"]),
         ({"rig": Rig(load_cell=replace(CELL, degrees_of_freedom=2.0))}, ["holding_moment, force_x, force_y"]),
-        ({"rig": 0.2}, ["rig", "0.2"]),
         ({"rig": CELL}, ["rig", "LoadCell"]),
         ({"family": "parabola"}, ["family", "'parabola'"]),
         ({"family": Family("circle")}, ["circle", "parabola"]),

@@ -85,13 +85,10 @@ def test_a_band_that_priors_give_needs_no_load_cell():
     assert float(needed.prior_width) == pytest.approx(0.00784, rel=0.01)
 
 
-@pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf, [0.1, 0.0], [[0.1]]])
-def test_widths_that_are_none_are_refused(width):
-    with refused(ParameterError, band_width=np.atleast_1d(width).tolist()):
-        required_noise(PLAN, width)
-
-
 def test_what_no_load_cell_gives_is_refused():
+    for width in (0.0, np.inf, [0.1, 0.0], [[0.1]]):
+        with refused(ParameterError, band_width=np.atleast_1d(width).tolist()):
+            required_noise(PLAN, width)
     without_zero = replace(PLAN, rig=Rig(load_cell=CELLS["bias"]))
     with refused(ParameterError, "1e-12", "unknowns"):
         required_noise(without_zero, [1e-3, 1e-12])
@@ -101,14 +98,9 @@ def test_what_no_load_cell_gives_is_refused():
         required_noise(PLAN, 0.01, where="nowhere")
 
 
-# ---- rods
-
 ROD = tb.Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
-METAL = Plan(
-    Parabola(2.5, 0.1),
-    Rig(load_cell=tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3), rod=ROD),
-    drive=tb.Rotation(drive_step=np.radians(9.0)),
-)
+SI_CELL = tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+METAL = Plan(Parabola(2.5, 0.1), Rig(ROD, SI_CELL), drive=PLAN.drive)
 LENGTHS, DIAMETERS = [0.09, 0.17, 0.2], [0.3e-3, 0.7e-3, 3e-3]
 
 
@@ -136,11 +128,10 @@ def test_every_rod_has_the_band_and_the_strain_of_its_own_plan():
 def test_rods_are_told_apart_and_the_best_has_the_narrowest_band_of_those_that_bear_it():
     found = rods()
     status = found.status.values
+    assert np.all((status == "does not reach") == np.isnan(found.width.values))
     assert (status[0] == "does not reach").all()
-    assert np.isnan(found.width.values[0]).all()
     np.testing.assert_array_equal(status[1:] == "ok", found.strain.values[1:] <= 0.012)
     assert set(status[1:].ravel()) == {"ok", "bent too far"}
-    assert np.isfinite(found.width.values[1:]).all()  # also of those that would stay bent
     best = float(found.best_width)
     assert best == found.width.values[status == "ok"].min()
     assert best > np.nanmin(found.width.values)  # a thicker one would see more, and stay bent

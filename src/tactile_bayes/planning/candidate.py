@@ -28,7 +28,7 @@ from tactile_bayes.planning.expected_band import (
     joined_arcs,
     mean_of_known,
 )
-from tactile_bayes.planning.knowledge import COARSE, STEP, Base, Knowledge
+from tactile_bayes.planning.knowledge import COARSE, STEP, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
@@ -58,11 +58,10 @@ class Candidate:
         return float(np.ptp(angles)) / max(angles.size - 1, 1)
 
     @property
-    def base(self) -> Base:
+    def base(self) -> tuple[float, float]:
         """The pivot, or where the first drive begins [length]."""
         first = self.drives[0]
-        x, y = first.poses[0, :2].tolist() if isinstance(first, Carried) else first.base
-        return x, y
+        return tuple(first.poses[0, :2].tolist()) if isinstance(first, Carried) else first.base
 
     @property
     def is_pivot(self) -> bool:

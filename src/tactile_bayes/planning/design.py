@@ -177,7 +177,7 @@ def design(
     criterion = criterion if isinstance(criterion, Criterion) else Criterion(criterion)
     draws = check_whole_number("draws", draws, 2)
     check_switch("nested", nested)
-    seed = seed_sequence(rng)
+    seed, candidates = seed_sequence(rng), _candidates(usual_drives(known, rig) if drives is None else drives)
     draws_from = np.random.default_rng([*words(seed), 1])
     if isinstance(known, str | Family):
         knowledge = known_from_prior(rig_of(rig), family_of(known), draws=draws, rng=draws_from)
@@ -185,7 +185,6 @@ def design(
         raise ParameterError("a rig and a posterior, which has its own: leave one of the two")
     else:
         knowledge = known_from_posterior(known, draws=draws, rng=draws_from)
-    candidates = _candidates(usual_drives(known, rig) if drives is None else drives)
     x = np.linspace(*(criterion.span or _span(knowledge)), _GRID_POINTS)
     question = Question(knowledge, candidates, x, criterion.probability, _NESTED if nested else 0, seed)
     with open_results_store(_identity(question), out, CANDIDATES) as store:
@@ -273,7 +272,7 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
     best = int(np.argmin(np.where(np.isfinite(order), order, np.inf)))
     slopes = [height_slopes(known.experiment.model, point, question.x) for point in known.points]
     present = np.array([mean_of_known(deviation_of_heights(of, known.precision)) for of in slopes])
-    bases = np.reshape(known.bases, (-1, 2)).T
+    bases = np.reshape([drive.base for drive in known.drives if isinstance(drive, Rotation)], (-1, 2)).T
     return xr.Dataset(
         {
             **{name: ("candidate", np.array(numbers), attrs) for name, (numbers, attrs) in columns.items()},

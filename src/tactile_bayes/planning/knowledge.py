@@ -25,8 +25,6 @@ from tactile_bayes.rig.unknown import DEFAULT, NOTHING, Unknown
 from tactile_bayes.sweep import Drive, Rotation, blind_angles, record_template, recorded_drives
 from tactile_bayes.tasks.documents import read_json
 
-Base = tuple[float, float]
-
 STEP = float(np.radians(2.0))  # step of the drive if a rotation has no grid of its own [rad]
 COARSE = float(np.radians(5.0))  # step of the drive for records of which only the events are used [rad]
 
@@ -40,11 +38,6 @@ class Knowledge:
     points: Floats  # draws of the parameters of contour, rig and noise, as `model` names them, shape (n, d)
     precision: Floats  # inverse of the covariance of the draws, shape (d, d)
     drives: tuple[Drive, ...]  # drives of the sweeps so far
-
-    @property
-    def bases(self) -> tuple[Base, ...]:
-        """Pivots of the sweeps so far [length]."""
-        return tuple(drive.base for drive in self.drives if isinstance(drive, Rotation))
 
     @property
     def rod(self) -> Rod:
@@ -92,19 +85,16 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     _refuse_shape_free(str(attrs["family"]))
     record = record_of(posterior)
     samples = posterior_draws(posterior)
-    cell = LoadCell.from_record(record) or LoadCell()
-    unknown: dict[str, Any] = {n: float(samples[n].mean()) for n in ("force_noise", "moment_noise") if n in samples}
-    cell = replace(cell, **unknown)
-    names = [str(name) for name in samples.data_vars if name not in unknown]
-    columns = {name: samples[name].values.ravel() for name in names}
+    columns = {str(name): values.values.ravel() for name, values in samples.data_vars.items()}
+    unknown: dict[str, Any] = {n: columns.pop(n).mean() for n in ("force_noise", "moment_noise") if n in columns}
+    cell = replace(LoadCell.from_record(record) or LoadCell(), **unknown)
     if unknown:
-        columns["noise_scale"] = np.ones(samples[next(iter(unknown))].size)
+        columns["noise_scale"] = np.ones(samples.sizes["chain"] * samples.sizes["draw"])
     drives = tuple(recorded_drives(record))
     scale: Unknown = DEFAULT if "noise_scale" in columns else 1.0
     rig, family = _described(attrs)
-    experiment = unmeasured(
-        replace(rig.with_unknown(noise_scale=scale), rod=rod_of(record), load_cell=cell), family, drives
-    )
+    rig = replace(rig.with_unknown(noise_scale=scale), rod=rod_of(record), load_cell=cell)
+    experiment = unmeasured(rig, family, drives)
     every = np.stack([columns[name] for name in experiment.model.names], axis=1)
     if unknown:  # a constant scale would make the covariance singular
         every[:, experiment.model.names.index("noise_scale")] *= np.exp(0.05 * rng.standard_normal(len(every)))
