@@ -61,14 +61,12 @@ def test_flat_spot_is_where_it_should_be_and_nowhere_else(at, factor):
     object_ = Misspecification(flat_spot=(at, factor)).contour(DRAWN)
 
     def ratio(slope_angles):
-        there = np.ravel(object_.radius_of_curvature(np.asarray(slope_angles)))
-        return there / radius(np.asarray(slope_angles))
+        return np.ravel(object_.radius_of_curvature(np.array(slope_angles))) / radius(np.array(slope_angles))
 
     np.testing.assert_allclose(ratio([at]), factor, rtol=2e-4)
     np.testing.assert_allclose(ratio([at - 0.1, at + 0.1]), factor ** math.exp(-0.5), rtol=2e-4)
-    far = np.linspace(-1.2, 1.2, 301)
-    far = far[np.abs(far - at) > 0.5]
-    np.testing.assert_allclose(ratio(far), 1.0, rtol=1e-5)
+    every = np.linspace(-1.2, 1.2, 301)
+    np.testing.assert_allclose(ratio(every[np.abs(every - at) > 0.5]), 1.0, rtol=1e-5)
 
 
 def test_flat_spot_leaves_the_lowest_point_where_it_was():

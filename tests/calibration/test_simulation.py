@@ -68,10 +68,6 @@ def scanned(made, *, friction=0.0, **options):
     return tb.scan(contour_of(made), rig, drive_angles=ANGLES, **options)
 
 
-def of_channels(made, what):
-    return np.array([made.truth[f"{name}_{what}"] for name in ("moment", "force_x", "force_y")])
-
-
 def agree(made, scan, *, rigidity=1.0, zeros=0.0):
     """What was measured and what was scanned, to 1e-8 of the unit of each channel.
 
@@ -175,7 +171,8 @@ def test_what_is_drawn_of_an_si_rod():
     offset = made.truth["drive_angle_offset"]
     way = np.linspace(-0.5, 0.5, made.measured.sizes["sample"])[:, None]
     scan = tb.scan(contour_of(made, left=0.003), drive_angles=ANGLES - offset, rig=Rig(rod=SI))
-    zeros = of_channels(made, "bias") + of_channels(made, "drift") * way
+    bias, drift = (np.array([made.truth[name] for name in GROUPS[group]]) for group in ("bias", "drift"))
+    zeros = bias + drift * way
     agree(made, scan, rigidity=made.truth["rigidity_scale"], zeros=zeros)
     np.testing.assert_allclose(made.measured.drive_angle, scan.record.drive_angle + offset, atol=1e-12)
     assert made.measured.attrs["units"] == "SI"
@@ -192,8 +189,7 @@ def test_forces_in_the_frame_of_a_cell_that_turns():
 def test_a_flat_spot_is_felt():
     """The object is what the simulation says it is."""
     made = simulated(truth=Misspecification(flat_spot=(0.3, 2.0)))
-    scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
-    same_loads(made, scan)
+    same_loads(made, tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES))
     assert np.max(np.abs(loads_of(made.measured) - loads_of(scanned(made).record))) > 1e-3
 
 
@@ -201,8 +197,7 @@ def test_contours_of_another_family():
     """With priors of its own; what is inferred is of the family that it is taken for."""
     asked = experiment("parabola", truth=Misspecification(family="circle"))
     made = simulate(asked, np.random.default_rng(2))
-    scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
-    same_loads(made, scan)
+    same_loads(made, tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES))
     assert "r" in made.truth
     assert "a" in asked.problem_of(made.measured).model.names
     assert not asked.is_of_family

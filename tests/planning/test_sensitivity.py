@@ -59,15 +59,12 @@ def test_without_a_contour_it_is_profile_ii_scaled_to_the_rod():
     np.testing.assert_allclose(si.noise_factor, dimensionless.noise_factor, rtol=1e-4)
 
 
-def test_words_are_in_the_units_of_the_record():
+def test_words_say_the_numbers_in_the_units_of_the_record():
     dimensionless, si = plain().attrs["words"], in_si().attrs["words"]
     assert re.search(r" L along the contour.* EI/L²", dimensionless, re.DOTALL)
     assert not re.search(r"\bmm\b|\bmN\b", dimensionless)
     assert re.search(r" mm along the contour.*\d mN .*\d mN m ", si, re.DOTALL)
     assert "EI/L" not in si
-
-
-def test_words_say_the_numbers():
     told = in_si()["information"]
     (line,) = words(in_si(), "expected width")
     touched, gap = (1e3 * float(told[f"{kind}_width"]) for kind in ("touched", "gap"))
@@ -135,7 +132,6 @@ def test_words_say_what_is_particular(options, said):
 @pytest.mark.parametrize(
     ("options", "error", "named"),
     [
-        ({"parts": ["informations"]}, ParameterError, ["parts", "['informations']"]),
         ({"parts": "information"}, ParameterError, ["parts", "'information'"]),
         ({"parts": []}, ParameterError, ["parts", "[]"]),
         ({"parts": ["information", "gap"]}, ParameterError, ["parts", "['information', 'gap']"]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -29,41 +29,13 @@ def summary(identity: Mapping[str, str], probability: float, outcomes: Mapping[i
     """Return the result of a calibration; see `calibrate`."""
     numbers = sorted(outcomes)
     rows = [outcomes[number] for number in numbers]
-    names = list(dict.fromkeys(name for row in rows for name in row.ranks))
-    ranks = np.array([[row.ranks.get(name, -1) for name in names] for row in rows], dtype=int).reshape(len(rows), -1)
-    p_values = [_uniformity(of_name) for of_name in ranks.T]
-    columns = list(dict.fromkeys(name for row in rows for name in row.numbers))
-    values = {name: np.array([row.numbers.get(name, np.nan) for row in rows]) for name in columns}
-    found = [name for name in CLAIMS if name in values]
-    is_lost = np.array([row.is_lost for row in rows])
-    for name in found:
-        values[name][is_lost] = 0.0
-    shares = [_known(values[name]) for name in found]
-    coverage = [float(s.mean()) if s.size else np.nan for s in shares]
-    errors = [float(s.std(ddof=1) / np.sqrt(s.size)) if s.size > 1 else np.nan for s in shares]
-    # The false-alarm rate is shared by all tests.
-    tested = int(np.isfinite(p_values).sum()) + sum(s.size >= FEWEST for s in shares)
-    level = FALSE_ALARM / max(tested, 1)
-    noticed = [_noticed_coverage(s, probability, level) for s in shares]
-    data = xr.Dataset(
-        {
-            "ranks": (("replicate", "quantity"), ranks, {"long_name": f"rank of the truth among {DRAWS} draws"}),
-            "rank_p_value": ("quantity", p_values),
-            "coverage": ("claim", coverage),
-            "coverage_error": ("claim", errors),
-            "coverage_replicates": ("claim", [s.size for s in shares]),
-            "noticed_below": ("claim", [below for below, _ in noticed]),
-            "noticed_above": ("claim", [above for _, above in noticed]),
-            "message": ("replicate", [row.message for row in rows]),
-            "traceback": ("replicate", [row.traceback for row in rows]),
-            **{name: ("replicate", of_name) for name, of_name in values.items()},
-        },
-        coords={"replicate": numbers, "quantity": names, "claim": found},
-    )
+    data, level = _tested(rows, probability)
+    data = data.assign_coords(replicate=numbers)
+    lost = {number: row.message for number, row in zip(numbers, rows, strict=True) if row.is_lost}
     unconverged = int(np.sum(data.converged.values == 0.0)) if "converged" in data else 0
-    tally = Tally(len(rows), int(is_lost.sum()), unconverged)
+    tally = Tally(len(rows), len(lost), unconverged)
     # If many are lost, the verdict states their share, and faults are sought in the others.
-    judged = data if tally.has_few_lost else data.isel(replicate=~is_lost)
+    judged = data if tally.has_few_lost else data.drop_sel(replicate=list(lost))
     faults = _faults(judged, probability, level)
     concluded = conclusion(tally, has_faults=bool(faults))
     left = len(rows) - tally.lost
@@ -84,12 +56,46 @@ def summary(identity: Mapping[str, str], probability: float, outcomes: Mapping[i
     reason = "; ".join(message for _, message in faults)
     if concluded == "calibrated":
         reason = (
-            f"ranks of the truth are uniform (smallest p of {len(names)} quantities {np.nanmin(p_values):.2g}), and "
-            f"bands and regions of {probability:.0%} hold as often as stated"
+            f"ranks of the truth are uniform (smallest p of {data.sizes['quantity']} quantities "
+            f"{float(data.rank_p_value.min()):.2g}), and bands and regions of {probability:.0%} hold as often as stated"
         )
-    lost = {number: row.message for number, row in zip(numbers, rows, strict=True) if row.is_lost}
     data.attrs["verdict"] = " ".join([statement(concluded, tally, reason), *_further(data, ranks_noticed, lost)])
     return data
+
+
+def _tested(rows: Sequence[Outcome], probability: float) -> tuple[xr.Dataset, float]:
+    """Return ranks, coverages and numbers of replicates, and the level of each test."""
+    names = list(dict.fromkeys(name for row in rows for name in row.ranks))
+    ranks = np.array([[row.ranks.get(name, -1) for name in names] for row in rows], dtype=int).reshape(len(rows), -1)
+    p_values = [_uniformity(of_name) for of_name in ranks.T]
+    columns = list(dict.fromkeys(name for row in rows for name in row.numbers))
+    values = {name: np.array([row.numbers.get(name, np.nan) for row in rows]) for name in columns}
+    found = [name for name in CLAIMS if name in values]
+    for name in found:
+        values[name][[row.is_lost for row in rows]] = 0.0
+    shares = [_known(values[name]) for name in found]
+    coverage = [float(s.mean()) if s.size else np.nan for s in shares]
+    errors = [float(s.std(ddof=1) / np.sqrt(s.size)) if s.size > 1 else np.nan for s in shares]
+    # The false-alarm rate is shared by all tests.
+    tested = int(np.isfinite(p_values).sum()) + sum(s.size >= FEWEST for s in shares)
+    level = FALSE_ALARM / max(tested, 1)
+    noticed = [_noticed_coverage(s, probability, level) for s in shares]
+    data = xr.Dataset(
+        {
+            "ranks": (("replicate", "quantity"), ranks, {"long_name": f"rank of the truth among {DRAWS} draws"}),
+            "rank_p_value": ("quantity", p_values),
+            "coverage": ("claim", coverage),
+            "coverage_error": ("claim", errors),
+            "coverage_replicates": ("claim", [s.size for s in shares]),
+            "noticed_below": ("claim", [below for below, _ in noticed]),
+            "noticed_above": ("claim", [above for _, above in noticed]),
+            "message": ("replicate", [row.message for row in rows]),
+            "traceback": ("replicate", [row.traceback for row in rows]),
+            **{name: ("replicate", of_name) for name, of_name in values.items()},
+        },
+        coords={"quantity": names, "claim": found},
+    )
+    return data, level
 
 
 def _noticed_coverage(shares: Floats, probability: float, level: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, seed_words
@@ -27,12 +27,11 @@ from tactile_bayes.planning.plan import SAMPLE_COLUMNS, Plan
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import COLUMNS, carried_sweeps, travel_unit, travels_of
 
-_STATES = 15  # default number of states in each sweep
 _ERRORS = ("along", "across")
 
 
 def noise_shares(
-    plan: Plan, *, rng: Rng, samples: int = 1024, states: int = _STATES, methods: tuple[Method, ...] = METHODS
+    plan: Plan, *, rng: Rng, samples: int = 1024, states: int = 15, methods: tuple[Method, ...] = METHODS
 ) -> xr.Dataset:
     """Return the shares of each reading's noise in the variance of a contact's error (Sobol' 2001).
 
@@ -42,7 +41,8 @@ def noise_shares(
     """
     if check_whole_number("samples", samples, 2, "give a power of two, like 1024") & (samples - 1):
         raise ParameterError(f"samples is {samples!r}: give a power of two, like 1024")
-    chosen = _states(plan, states)
+    record, rows = _states(plan, states)
+    chosen = record.isel(sample=rows)
     quiet = plan.certain(chosen)
     noises = {**plan.cell.standard_deviations, "drive_angle": plan.cell.drive_angle_deviation}
     sources = [name for name in SOURCES if noises[name] > 0.0]
@@ -68,10 +68,9 @@ def noise_shares(
         answered = np.asarray(~np.any(missing, axis=-1))
         for out, index in zip((first, total), found, strict=True):
             out[m] = np.where(answered[..., None], index.reshape(shape[1:]), np.nan)
-    length = {"units": COLUMNS["base_x"].unit_in(quiet.attrs["units"])}
-    along = {"units": travel_unit(quiet)}
+    length, along = {"units": COLUMNS["base_x"].unit_in(quiet.attrs["units"])}, {"units": travel_unit(quiet)}
     dims = ("reconstruction", "sample", "error")
-    distances = event_distances(plan, chosen.sweep.values, chosen.travel.values)
+    distances = event_distances(plan, chosen.sweep.values, travels_of(record)[rows])
     return xr.Dataset(
         {
             **chosen[SAMPLE_COLUMNS].data_vars,
@@ -103,28 +102,24 @@ def _distribution(plan: Plan, source: str, deviation: float) -> Any:
     return stats.t(nu, scale=deviation / math.sqrt(nu / (nu - 2.0)))
 
 
-def _states(plan: Plan, count: int) -> xr.Dataset:
-    """Return loaded samples at even distances between first contact and snap-off of every sweep."""
+def _states(plan: Plan, count: int) -> tuple[xr.Dataset, Index]:
+    """Return a record, and its loaded samples at even distances between first contact and snap-off of every sweep."""
     record, sweeps = plan.scan.record, range(len(plan.scan.sweeps))
     carried = {*carried_sweeps(record), *turned_sweeps(record, plan.cell)}
     if carried == set(sweeps):
         is_loaded = record.truth_contact_phase.values != "none"
         loaded = [np.flatnonzero(is_loaded & (record.sweep.values == number)) for number in sweeps]
         rows = [own[(even_shares(count) * own.size).astype(int)] for own in loaded if own.size]
-        return _with_travels(record).isel(sample=np.concatenate(rows))
+        return record, np.concatenate(rows)
     if carried:
         raise ParameterError(
             "noise_shares takes rotations one way, or drives that carry the base or turn back, not both: plan them one "
             "by one, or leave noise_shares out of the parts"
         )
     angles = [angles_within(plan, number, even_shares(count)) for number in sweeps]
-    record = _with_travels(plan.at_angles(np.concatenate(angles)).scan.record)
+    record = plan.at_angles(np.concatenate(angles)).scan.record
     near = np.array([np.isin(record.drive_angle.values[i], angles[s]) for i, s in enumerate(record.sweep.values)])
-    return record.isel(sample=np.flatnonzero(near & (record.truth_contact_phase.values != "none")))
-
-
-def _with_travels(record: xr.Dataset) -> xr.Dataset:
-    return record.assign(travel=("sample", travels_of(record)))
+    return record, np.flatnonzero(near & (record.truth_contact_phase.values != "none"))
 
 
 def _errors(quiet: xr.Dataset, plan: Plan, method: Method, noise: dict[str, Floats]) -> Floats:

@@ -130,8 +130,7 @@ def required_rod(
 ) -> xr.Dataset:
     """Return the expected band of rods of every length and diameter, whether they stay elastic, and the best rod.
 
-    A thicker rod makes larger loads, which are less noisy, and is bent closer to its elastic limit. The object and
-    the pivot stay where they are.
+    The object and the pivot stay where they are.
 
     Parameters
     ----------
