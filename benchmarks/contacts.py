@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -27,6 +28,13 @@ METHODS = ("raw", "constrained")
 PROBABILITIES = (0.5, 0.9, 0.95)
 PHASES = ("tip", "tangential")
 PLACES = {"first 5 % of the sweep": (0.0, 0.05), "in between": (0.05, 0.95), "last 5 % before snap-off": (0.95, 1.0)}
+# Shapes, with the ranges of their own parameters.
+SHAPES: list[Any] = [
+    (Parabola, (0.3, 1.5)),
+    (Circle, (0.4, 1.5)),
+    (Ellipse, (0.4, 1.5), (0.4, 1.5)),
+    (PowerLaw, (0.5, 1.5), (1.5, 4.0)),
+]
 SAMPLES = {"first 5 % of the sweep": 4, "in between": 12, "last 5 % before snap-off": 4}  # contacts taken of each sweep
 
 
@@ -36,9 +44,6 @@ def main(sweeps: int = 1000) -> None:
         print_errors()
         print(f"\nHow many regions hold the true contact, of {sweeps:,} sweeps:\n")
         print_coverage(sweeps)
-
-
-# ---- how far off
 
 
 def print_errors() -> None:
@@ -70,9 +75,6 @@ def errors(contacts: xr.Dataset, record: xr.Dataset) -> tuple[Floats, Floats]:
     """Return errors along the true contour and across it."""
     x, y = (contacts[name].values - record[f"truth_{name}"].values for name in ("contact_x", "contact_y"))
     return along_and_across(x, y, record.truth_slope_angle.values)
-
-
-# ---- how often covered
 
 
 def print_coverage(sweeps: int, seed: int = 1) -> None:
@@ -138,15 +140,8 @@ def records(sweeps: int, seed: int) -> Iterator[xr.Dataset]:
 
 def contours(rng: np.random.Generator, number: int, count: int) -> Contour:
     x_c, q = rng.normal(0.0, 0.1, count), rng.uniform(0.3, 0.7, count)
-    match number // 2 % 4:
-        case 0:
-            return Parabola(rng.uniform(0.3, 1.5, count), q, x_c)
-        case 1:
-            return Circle(rng.uniform(0.4, 1.5, count), q, x_c)
-        case 2:
-            return Ellipse(rng.uniform(0.4, 1.5, count), rng.uniform(0.4, 1.5, count), q, x_c)
-        case _:
-            return PowerLaw(rng.uniform(0.5, 1.5, count), rng.uniform(1.5, 4.0, count), q, x_c)
+    shape, *ranges = SHAPES[number // 2 % len(SHAPES)]
+    return shape(*(rng.uniform(low, high, count) for low, high in ranges), q, x_c)
 
 
 def record_of(drawn: Contour, direction: str, count: int, rng: np.random.Generator) -> xr.Dataset:
@@ -158,10 +153,10 @@ def record_of(drawn: Contour, direction: str, count: int, rng: np.random.Generat
     first, last = (events[f"{when}_drive_angle"].values[good, None] for when in ("first_contact", "snap_off"))
     angles = first + (last - first) * share
     swept = tb.scan_many(drawn.take(good), angles, direction=direction)
-    names = ("holding_moment", "force_x", "force_y")
-    columns = {name: swept[name].values.ravel() for name in (*names, "drive_angle")}
-    for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength", "contact_phase"):
-        columns[f"truth_{name}"] = swept[name].values.ravel()
+    readings = ("holding_moment", "force_x", "force_y", "drive_angle")
+    truths = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "contact_phase")
+    columns = {name: swept[name].values.ravel() for name in readings}
+    columns |= {f"truth_{name}": swept[name].values.ravel() for name in truths}
     columns["sweep"] = np.repeat(np.arange(count), angles.shape[1])
     columns["direction"] = np.full(angles.size, direction)
     return make_record(columns)

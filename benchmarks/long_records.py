@@ -13,8 +13,7 @@ SAMPLES = 1_000, 3_000, 24_000, 200_000
 _SECONDS = 3.0
 
 
-def long_records() -> None:
-    """Print a line for each number of samples."""
+def main() -> None:
     print(f"infer_contour with max_seconds={_SECONDS:g}")
     print(f"{'samples':>8}  {'taken':>6}  {'wall':>7}  {'processor':>9}  {'memory':>8}")
     for samples in SAMPLES:
@@ -48,4 +47,4 @@ if __name__ == "__main__":
             warnings.simplefilter("ignore")
             _one(int(sys.argv[1]))
     else:
-        long_records()
+        main()

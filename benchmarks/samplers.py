@@ -63,7 +63,7 @@ def main(evaluations: int = 40_000) -> None:
         print(line("", ("evaluations", "CPU", "R̂", "ESS", "ESS/s", "ESS/1000", "means off"), 54, 12))
         reference = None
         for name, package, sampler in samplers(walk):
-            if not installed(package):
+            if not installed(package[1]):
                 print(f"{name:<54}not installed, skipped: see `make samplers`")
                 continue
             target = Counted(model.log_probability)
@@ -86,12 +86,11 @@ def demonstration() -> ContourModel:
     return Experiment(measured, tb.Rig(unknown="nothing")).model
 
 
-def installed(package: tuple[str, str]) -> bool:
+def installed(module: str) -> bool:
     try:
-        import_module(package[1])
+        import_module(module)
     except ImportError as error:
-        if error.name != package[1]:
-            print(f"{package[0]} lacks {error.name}: install it beside", file=sys.stderr)
+        print(f"{module} needs {error.name}", file=sys.stderr)
         return False
     return True
 

@@ -145,8 +145,7 @@ def again(number, **options):
 @pytest.mark.slow
 def test_a_replicate_is_the_same_again(small):
     found, folder = small
-    before = (folder / REPLICATES.file).read_bytes()
-    made = again(1, out=folder)
+    before, made = (folder / REPLICATES.file).read_bytes(), again(1, out=folder)
     ranks, numbers = made.outcome.ranks, made.outcome.numbers
     assert (made.number, made.outcome.message) == (1, str(found.message[1].values))
     assert ranks == {name: int(found["ranks"].sel(replicate=1, quantity=name)) for name in found.quantity.values}
@@ -166,8 +165,7 @@ def test_the_error_is_raised_where_a_replicate_is_lost(monkeypatch):
     with pytest.raises(ZeroDivisionError, match="nothing left"):
         again(0)
     made = again(0, throw=False)
-    assert made.outcome.is_lost
-    assert made.outcome.message == "ZeroDivisionError: nothing left"
+    assert (made.outcome.is_lost, made.outcome.message) == (True, "ZeroDivisionError: nothing left")
     assert list(made.truth) == [*PRIORS, "noise_scale"]
     assert made.measured.sizes["sample"] == 2 * ANGLES.size
     assert made.posterior is None
@@ -248,8 +246,7 @@ def test_a_killed_run_goes_on(tmp_path):
     run.wait()
     done, told = len(rows_of(tmp_path)), []
     found = quickly(replicates=done, out=tmp_path, workers=Workers(1, told.append))
-    assert found.sizes["replicate"] == done > 0
-    assert told == []
+    assert (found.sizes["replicate"], told) == (done, [])
     assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
 
 

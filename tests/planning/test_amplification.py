@@ -83,12 +83,13 @@ def differences(plan, method, source):
     return (4.0 * found[0] - found[1]) / 3.0  # Richardson
 
 
-AT_ONCE = ("cross-talk", "all of it turning", "friction")
-GAINS = [name if name in AT_ONCE else pytest.param(name, marks=pytest.mark.slow) for name in PLANS]
+SLOW = {name: pytest.param(name, marks=pytest.mark.slow) for name in PLANS}
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", GAINS)
+@pytest.mark.parametrize(
+    "name", ["cross-talk", SLOW["correlated noise"], "all of it turning", "friction", SLOW["another pivot"]]
+)
 def test_gains_are_differences_of_reconstruct(name, method):
     """Both phases, both directions; relative to the largest gain of a sample, by the same source."""
     plan, grown = in_the_middle(name)
@@ -124,10 +125,7 @@ def test_distances_are_along_the_drive():
     assert both.before_snap_off.attrs["units"] == "rad, 1"
 
 
-SLOWLY = [pytest.param(name, marks=pytest.mark.slow) for name in ("correlated noise", "friction", "cross-talk")]
-
-
-@pytest.mark.parametrize("name", ["all of it turning", *SLOWLY])
+@pytest.mark.parametrize("name", ["all of it turning", SLOW["correlated noise"], SLOW["friction"], SLOW["cross-talk"]])
 def test_standard_deviations_are_those_of_noise_that_is_drawn(name):
     """Within 4.5 standard errors: of some 30 numbers for each rig, false alarms in 1 of 3000 runs."""
     draws = 600

@@ -91,9 +91,8 @@ def test_laplace_and_nested_monte_carlo_agree(posterior):
 @pytest.mark.slow
 def test_from_the_same_pivot_the_gap_stays_and_from_beside_it_closes(posterior):
     found = designed(posterior, drives=pivots((0.0, 0.0), (0.3, 0.0)))
-    sweeps = scan(Parabola(0.5, q=0.5)).events
-    width = sweeps["forward"].snap_off.contact_x - sweeps["backward"].snap_off.contact_x
-    assert found.gap.values[0] == pytest.approx(width, abs=0.02)
+    forward, backward = (sweep.snap_off.contact_x for sweep in scan(Parabola(0.5, q=0.5)).sweeps)
+    assert found.gap.values[0] == pytest.approx(forward - backward, abs=0.02)
     assert found.gap.values[1] == pytest.approx(0.0, abs=1e-6)
 
 
@@ -197,9 +196,8 @@ def test_what_a_posterior_knows_of_rig_and_contour_is_known(measured):
 
 def test_shifts_of_pivots_are_left_out():
     """Of a rig as of a posterior, for candidates of two pivots, too."""
-    rig = AS_STATED.with_unknown(base="default")
-    drives = [pivots((0.0, 0.0), (0.2, 0.0))]
-    found, right = (designed(rig=each, drives=drives) for each in (rig, AS_STATED))
+    rigs, drives = (AS_STATED.with_unknown(base="default"), AS_STATED), [pivots((0.0, 0.0), (0.2, 0.0))]
+    found, right = (designed(rig=rig, drives=drives) for rig in rigs)
     np.testing.assert_array_equal(found.width, right.width)
 
 
@@ -208,10 +206,9 @@ def test_the_calibration_of_another_rig_is_refused():
     joint = RigPrior({"rigidity_scale": stats.lognorm(s=0.01)}, np.eye(1), 0.0, "0", stated)
     unknown = {name: value for name, value in NOTHING.items() if name != "rigidity_scale"}
     rig = Rig(unknown=unknown, calibration=joint)
-    with refused(ParameterError, "rig", "match"):
-        designed(rig=rig)
-    with refused(ParameterError, "rig", "match"):
-        _ = Plan(Parabola(0.5, q=0.5), rig).model
+    for use in (lambda: designed(rig=rig), lambda: Plan(Parabola(0.5, q=0.5), rig).model):
+        with refused(ParameterError, "rig", "match"):
+            use()
 
 
 def test_weighted_bands():

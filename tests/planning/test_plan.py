@@ -178,9 +178,9 @@ def test_whitened_slopes_have_the_products_of_the_dense_covariance(name, present
 
 def test_errors_that_are_drawn_become_independent():
     """Covariance of 20000 records: every entry within five standard errors of the identity's, of 231 in all."""
-    cell = replace(SHARED["all"], drive_angle_noise=0.0)
+    cell, zeros = replace(SHARED["all"], drive_angle_noise=0.0), np.zeros((SAMPLES, 3))
     draws = cell.simulate(np.zeros((20000, SAMPLES, 3)), rng=1)
-    white = whitening(cell, np.zeros((SAMPLES, 3)), np.zeros((SAMPLES, 3)), np.ones(3, dtype=bool))
+    white = whitening(cell, zeros, zeros, np.ones(3, dtype=bool))
     flat = white(np.moveaxis(draws, 0, -1)).reshape(3 * SAMPLES, -1)
     error = 5.0 * np.sqrt((1.0 + np.eye(3 * SAMPLES)) / 20000)
     assert np.all(np.abs(flat @ flat.T / 20000 - np.eye(3 * SAMPLES)) < error)
