@@ -90,7 +90,8 @@ def installed(module: str) -> bool:
     try:
         import_module(module)
     except ImportError as error:
-        print(f"{module} needs {error.name}", file=sys.stderr)
+        if error.name != module:
+            print(f"{module} lacks {error.name}: install it beside", file=sys.stderr)
         return False
     return True
 

@@ -122,8 +122,7 @@ def test_expected_widths_are_those_of_information():
     right = information(plan)
     of = small().sel(distance=0.4, noise_factor=1.0, contour="II")
     for kind in ("touched", "gap"):
-        width = float(of[f"expected_{kind}_width"])
-        assert width == pytest.approx(float(right[f"{kind}_width"]), rel=1e-6), kind
+        assert float(of[f"expected_{kind}_width"]) == pytest.approx(float(right[f"{kind}_width"]), rel=1e-6), kind
     ends = [sweep.snap_off.contact_x for sweep in plan.scan.sweeps]
     assert float(of.gap_width) == pytest.approx(max(ends) - min(ends))
     assert np.isnan(small().posterior_gap_width.values).all()  # none was asked for
@@ -145,8 +144,7 @@ def test_a_rod_that_does_not_reach_leaves_a_message(distance):
     lost, made = found.isel(distance=0), found.isel(distance=1)
     assert made.message.item() == "ok"
     assert lost.message.item().split(":")[0] in ("ReachError", "ContourError")
-    names = [name for name in found.data_vars if name != "message"]
-    assert all(np.isnan(lost[name].values).all() for name in names)
+    assert all(np.isnan(values).all() for values in lost.drop_vars("message").data_vars.values())
 
 
 @pytest.mark.slow
