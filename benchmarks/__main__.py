@@ -145,7 +145,7 @@ def constrained() -> tuple[Row, str]:
 def posteriors() -> Row:
     """Time a contact of a double sweep at 1°; every fortieth sample by emcee, four ensembles to 400 effective draws."""
     measured = CELL.measure(tb.scan(CONTOUR).record, rng=1)
-    density, _ = density_of(measured.isel(sample=slice(None, None, 40)), CELL, 0.0, "flat")
+    density, *_ = density_of(measured.isel(sample=slice(None, None, 40)), CELL, 0.0, "flat")
     starts = draw_contacts(density, 4 * 24, np.random.SeedSequence(1)).points
     settings = tb.SamplerSettings(walkers=24, min_ess=400.0, max_steps=4000)
 
