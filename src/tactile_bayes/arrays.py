@@ -7,14 +7,10 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+# Truth values, numbers, and whole numbers that count along an axis, of any shape.
 Flags: TypeAlias = NDArray[np.bool_]
-"""Truth values of any shape."""
-
 Floats: TypeAlias = NDArray[np.float64]
-"""Numbers of any shape."""
-
 Index: TypeAlias = NDArray[np.intp]
-"""Whole numbers of any shape that count along an axis."""
 
 
 class RandomSource(Protocol):

@@ -15,14 +15,9 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 
-TINY = math.ulp(0.0)
-"""Least positive number."""
-
-_MOST = 10**9
-"""Largest count, of draws and the like."""
-
-_SHOWN = 120
-"""Largest number of characters of a value in a message."""
+TINY = math.ulp(0.0)  # least positive number
+_MOST = 10**9  # largest count, of draws and the like
+_SHOWN = 120  # largest number of characters of a value in a message
 
 
 def shown(value: object) -> str:
@@ -114,17 +109,15 @@ def check_numbers(
 ) -> Floats:
     """Return finite numbers from `least` to `most` as an array; None in its shape stands for any size above 0."""
     numbers = as_numbers(values)
-    if numbers is None or not (np.isfinite(numbers) & (least <= numbers) & (numbers <= most)).all():
-        raise refused(name, values, correction)
-    if shape is not None and not _is_of(shape, numbers.shape):
+    is_right = numbers is not None and (np.isfinite(numbers) & (least <= numbers) & (numbers <= most)).all()
+    if numbers is None or not is_right or not (shape is None or _is_of(shape, numbers.shape)):
         raise refused(name, values, correction)
     return numbers
 
 
 def _is_of(shape: Sequence[int | None], sizes: Sequence[int]) -> bool:
-    return len(shape) == len(sizes) and all(
-        size > 0 if wanted is None else size == wanted for wanted, size in zip(shape, sizes, strict=True)
-    )
+    fits = [size > 0 if wanted is None else size == wanted for wanted, size in zip(shape, sizes, strict=False)]
+    return len(shape) == len(sizes) and all(fits)
 
 
 def check_pivots(name: str, values: Any) -> list[tuple[float, float]]:
@@ -203,9 +196,8 @@ def check_names(name: str, values: Any) -> list[str]:
 
 def check_mapping(name: str, values: Any, correction: str) -> None:
     """Refuse a value that is neither a mapping with names as keys nor None."""
-    is_dataset = hasattr(values, "data_vars")  # a mapping too, but of columns
-    is_mapping = isinstance(values, Mapping) and not is_dataset and all(isinstance(key, str) for key in values)
-    if values is not None and not is_mapping:
+    is_mapping = isinstance(values, Mapping) and not hasattr(values, "data_vars")  # a dataset is one of columns
+    if values is not None and not (is_mapping and all(isinstance(key, str) for key in values)):
         raise refused(name, values, correction)
 
 

@@ -18,18 +18,12 @@ from scipy import stats
 from scipy.special import ndtri
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import as_number, shown
+from tactile_bayes.checks import as_number, refused, shown
 from tactile_bayes.errors import ParameterError
 
-_TRIED = 16
-"""Number of draws with which a distribution is tried."""
-
-_NARROWEST = 64.0 * float(np.finfo(float).eps)
-"""Range of draws over their size up to which they count as one number."""
-
-UNWRITTEN = "not written"
-"""Text of what has a distribution that is none of SciPy's."""
-
+_TRIED = 16  # number of draws with which a distribution is tried
+_NARROWEST = 64.0 * float(np.finfo(float).eps)  # range of draws over their size up to which they count as one number
+UNWRITTEN = "not written"  # text of what has a distribution that is none of SciPy's
 _ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
@@ -45,19 +39,17 @@ class Distribution(Protocol):
 class DistributionKind(NamedTuple):
     """A distribution by the name and the numbers that a table states."""
 
-    size: int
-    """How many numbers."""
+    size: int  # how many numbers
     is_possible: Callable[..., bool]
-    rule: str
-    """Rule for the numbers, for messages."""
+    rule: str  # for the numbers, for messages
     text: str
     frozen: Callable[..., Distribution]
+    # Its numbers from those of a frozen distribution of the same name; None if they do not state all of it.
     numbers: Callable[[Mapping[str, Any]], tuple[float, ...] | None]
-    """Its numbers from those of a frozen distribution of the same name; None if they do not state all of it."""
-    at: Callable[..., Any]
-    """Quantile function of numbers and probabilities."""
+    at: Callable[..., Any]  # quantile function of numbers and probabilities
 
 
+# Distributions that a table states by a name and a list of numbers, as { normal = [0.0, 0.1] }.
 KINDS = {
     "uniform": DistributionKind(
         2,
@@ -105,11 +97,10 @@ KINDS = {
         lambda scale, share: -scale * ndtri(0.5 - 0.5 * share),
     ),
 }
-"""Distributions that a table states by a name and a list of numbers, as { normal = [0.0, 0.1] }."""
-
+# Names of these distributions in SciPy.
 _NAMES = dict(zip(("uniform", "reciprocal", "norm", "lognorm", "halfnorm"), KINDS, strict=True))
 _NAMES["loguniform"] = "log_uniform"
-"""Names of these distributions in SciPy."""
+_USUAL = {("loc", 0.0), ("scale", 1.0)}  # numbers of a distribution that need no mention
 
 
 def distribution_of_table(
@@ -124,37 +115,41 @@ def distribution_of_table(
     if plain is not None and math.isfinite(plain):
         return plain
     if not isinstance(value, Mapping) or len(value) != 1:
-        raise ParameterError(f"{name} is {shown(value)}: {hint}")
+        raise refused(name, value, hint)
     ((kind, given),) = value.items()
-    if isinstance(given, Mapping):
-        return _of_scipy(str(kind), given, name, number, hint)
-    if kind not in KINDS:
+    of_scipy = getattr(stats, str(kind), None)
+    if isinstance(given, Mapping) and isinstance(of_scipy, stats.rv_continuous):
+        found = _of_scipy(of_scipy, f"{name}.{kind}", given, number)
+    elif kind in KINDS and not isinstance(given, Mapping):
+        found = _of_kind(KINDS[kind], f"{name}.{kind}", given, number)
+    else:
         raise ParameterError(f"{name} has the distribution {shown(kind)}, which is unknown: {hint}")
-    numbers = [number(each) for each in (given if isinstance(given, list | tuple) else [given])]
-    count = KINDS[kind].size
-    if len(numbers) != count or not all(each is not None and math.isfinite(each) for each in numbers):
-        wanted = "a finite number" if count == 1 else f"a list of {count} finite numbers"
-        raise ParameterError(f"{name}.{kind} is {shown(given)}: give {wanted}")
-    if not KINDS[kind].is_possible(*numbers):
-        raise ParameterError(f"{name}.{kind} is {shown(given)}: {KINDS[kind].rule}")
-    found = KINDS[kind].frozen(*numbers)
     check_distribution(name, found)
     return found
+
+
+def _of_kind(kind: DistributionKind, name: str, given: Any, number: Callable[[Any], float | None]) -> Distribution:
+    numbers = [number(each) for each in (given if isinstance(given, list | tuple) else [given])]
+    if len(numbers) != kind.size or not all(each is not None and math.isfinite(each) for each in numbers):
+        raise refused(name, given, f"give {'a finite number' if kind.size == 1 else f'a list of {kind.size} numbers'}")
+    if not kind.is_possible(*numbers):
+        raise refused(name, given, kind.rule)
+    return kind.frozen(*numbers)
 
 
 def _of_scipy(
-    kind: str, given: Mapping[str, Any], name: str, number: Callable[[Any], float | None], hint: str
+    of_scipy: stats.rv_continuous, name: str, given: Mapping[str, Any], number: Callable[[Any], float | None]
 ) -> Distribution:
-    of_scipy = getattr(stats, kind, None)
-    if not isinstance(of_scipy, stats.rv_continuous):
-        raise ParameterError(f"{name} has the distribution {shown(kind)}, which is unknown: {hint}")
-    numbers = {each: number(value) for each, value in given.items()}
-    known = [*(of_scipy.shapes.split(", ") if of_scipy.shapes else []), "loc", "scale"]
+    numbers, known = {each: number(value) for each, value in given.items()}, _names_of(of_scipy)
     if set(numbers) - set(known) or None in numbers.values() or set(known[:-2]) - set(numbers):
-        raise ParameterError(f"{name}.{kind} is {shown(dict(given))}: give numbers for {', '.join(known)}")
+        raise refused(name, dict(given), f"give numbers for {', '.join(known)}")
     found: Distribution = of_scipy(**numbers)
-    check_distribution(name, found)
     return found
+
+
+def _names_of(of_scipy: stats.rv_continuous) -> list[str]:
+    """Return the names of the numbers of a distribution of SciPy."""
+    return [*(of_scipy.shapes.split(", ") if of_scipy.shapes else []), "loc", "scale"]
 
 
 def table_of_distribution(value: float | Distribution) -> Any:
@@ -171,10 +166,6 @@ def table_of_distribution(value: float | Distribution) -> Any:
     if short is None:
         return {scipy_name: {name: each for name, each in numbers.items() if (name, each) not in _USUAL}}
     return {kind: list(short) if len(short) > 1 else short[0]}
-
-
-_USUAL = {("loc", 0.0), ("scale", 1.0)}
-"""Numbers of a distribution that need no mention."""
 
 
 def text_or_unwritten(text: Callable[[], str]) -> str:
@@ -200,17 +191,15 @@ def open_share(share: Floats) -> Floats:
 
 
 def frozen(value: Any) -> Any:
-    """Return a distribution of SciPy's newer kind, as `scipy.stats.Normal`, with the methods of a frozen one.
-
-    Anything else is returned as it is.
-    """
+    """Return a distribution of SciPy's newer kind, as `scipy.stats.Normal`, like a frozen one; all else as it is."""
     if isinstance(value, Distribution) or not all(hasattr(value, each) for each in ("logpdf", "sample", "support")):
         return value
-    numbers: dict[str, Any] = {name: as_number(each) for name, each in getattr(value, "_parameters", {}).items()}
-    if type(value).__name__ == "Normal" and None not in numbers.values() and {"mu", "sigma"} <= set(numbers):
-        return stats.norm(numbers["mu"], numbers["sigma"])
-    if type(value).__name__ == "Uniform" and None not in numbers.values() and {"a", "b"} <= set(numbers):
-        return stats.uniform(numbers["a"], numbers["b"] - numbers["a"])
+    numbers = {name: as_number(each) for name, each in getattr(value, "_parameters", {}).items()}
+    match (type(value).__name__, numbers):
+        case ("Normal", {"mu": float(mean), "sigma": float(deviation)}):
+            return stats.norm(mean, deviation)
+        case ("Uniform", {"a": float(low), "b": float(high)}):
+            return stats.uniform(low, high - low)
     return _Newer(value)
 
 
@@ -219,6 +208,13 @@ class _Newer:
     """A distribution of SciPy's newer kind with the methods of a frozen one."""
 
     of: Any
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what has the same name in both kinds, like cdf, median and support."""
+        return getattr(object.__getattribute__(self, "of"), name)
+
+    def __repr__(self) -> str:
+        return repr(self.of)
 
     def logpdf(self, x: Any) -> Any:
         return self.of.logpdf(x)
@@ -229,32 +225,17 @@ class _Newer:
     def std(self) -> Any:
         return self.of.standard_deviation()
 
-    def median(self) -> Any:
-        return self.of.median()
-
-    def mean(self) -> Any:
-        return self.of.mean()
-
     def ppf(self, q: Any) -> Any:
         return self.of.icdf(q)
-
-    def cdf(self, x: Any) -> Any:
-        return self.of.cdf(x)
-
-    def support(self) -> Any:
-        return self.of.support()
-
-    def __repr__(self) -> str:
-        return repr(self.of)
 
 
 def check_distribution(parameter: str, distribution: Any) -> None:
     """Refuse what is no distribution, or has no density."""
     if not isinstance(distribution, Distribution) or isinstance(distribution, stats.rv_continuous):
-        correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
-        if isinstance(distribution, Mapping):
-            correction += "; tables like this one are for rig.toml, which Rig.read reads"
-        raise ParameterError(f"the prior of {parameter} is {shown(distribution)}: {correction}")
+        is_table = isinstance(distribution, Mapping)
+        more = "; tables like this one are for rig.toml, which Rig.read reads" if is_table else ""
+        correction = f"give a frozen distribution, like scipy.stats.norm(0.5, 0.1){more}"
+        raise refused(f"the prior of {parameter}", distribution, correction)
     flaw = _flaw_of(distribution)
     if flaw:
         kind = getattr(getattr(distribution, "dist", None), "name", "")
@@ -268,8 +249,9 @@ def _flaw_of(distribution: Distribution) -> str:
         number = as_number(value)
         if number is None or np.isnan(number):
             return f"has the {name} {shown(value)}: give a number"
+    no_width = "has no width, and so no density: it is known, so give the number, {:.6g}"
     if numbers.get("scale") == 0.0:
-        return _no_width(float(numbers["loc"]))
+        return no_width.format(numbers["loc"])
     try:
         with np.errstate(all="ignore"):
             low, high = support_of(distribution)
@@ -282,12 +264,8 @@ def _flaw_of(distribution: Distribution) -> str:
     if not low <= high or not np.isfinite(draws).all() or np.isnan(density).any() or np.isneginf(density).any():
         return "has no finite draws, or no density there: check its numbers"
     if not np.ptp(draws) > _NARROWEST * float(np.abs(draws).max()):
-        return _no_width(float(draws[0]))
+        return no_width.format(draws[0])
     return ""
-
-
-def _no_width(value: float) -> str:
-    return f"has no width, and so no density: it is known, so give the number, {value:.6g}"
 
 
 def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
@@ -298,22 +276,18 @@ def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose
 
 
 def numbers_of(distribution: Any) -> dict[str, Any]:
-    """Return shapes, loc and scale of a frozen distribution of scipy.stats by name, however they were given.
-
-    {} for an object of another kind.
-    """
+    """Return shapes, loc and scale of a frozen distribution of scipy.stats by name; {} for another object."""
     of_scipy = getattr(distribution, "dist", None)
     if not isinstance(of_scipy, stats.rv_continuous):
         return {}
     shapes, loc, scale = of_scipy._parse_args(*distribution.args, **distribution.kwds)  # type: ignore[attr-defined]
-    names = of_scipy.shapes.split(", ") if of_scipy.shapes else []
-    return dict(zip((*names, "loc", "scale"), (*shapes, loc, scale), strict=True))
+    return dict(zip(_names_of(of_scipy), (*shapes, loc, scale), strict=True))
 
 
 def support_of(distribution: Distribution) -> tuple[float, float]:
     """Return the ends of a distribution's support."""
-    ends = distribution.support() if hasattr(distribution, "support") else (-np.inf, np.inf)
-    return float(ends[0]), float(ends[1])
+    low, high = distribution.support() if hasattr(distribution, "support") else (-np.inf, np.inf)
+    return float(low), float(high)
 
 
 def in_words(distribution: Distribution) -> str:
@@ -325,10 +299,9 @@ def in_words(distribution: Distribution) -> str:
     numbers = numbers_of(distribution)
     if of_scipy is None or not numbers:
         return repr(distribution)
-    if numbers.keys() == {"loc", "scale"}:
+    written = [f"{name}={value:g}" for name, value in numbers.items() if name != "loc" or value]
+    if len(numbers) == 2:
         written = [f"{value:g}" for value in numbers.values()]
-    else:
-        written = [f"{name}={value:g}" for name, value in numbers.items() if name != "loc" or value]
     return f"{of_scipy.name}({', '.join(written)})"
 
 
@@ -338,16 +311,10 @@ def all_in_words(distributions: Mapping[str, Distribution]) -> str:
 
 
 def log_density_of(distribution: Distribution) -> Callable[[Floats], Floats]:
-    """Return the log-density of a distribution, as its `logpdf`, for common ones ten times faster.
-
-    For a few points a call of `logpdf` takes longer than the likelihood of a whole record.
-    """
-    of_scipy = getattr(distribution, "dist", None)
-    closed = _CLOSED.get(type(of_scipy))
-    if of_scipy is None or closed is None:
-        return distribution.logpdf
+    """Return the log-density of a distribution, its `logpdf`, in a closed form for common ones, ten times faster."""
+    closed = _CLOSED.get(type(getattr(distribution, "dist", None)))
     values = numbers_of(distribution)
-    if any(np.ndim(value) for value in values.values()):
+    if closed is None or any(np.ndim(value) for value in values.values()):
         return distribution.logpdf
     return partial(closed, **{name: float(value) for name, value in values.items()})
 

@@ -12,12 +12,9 @@ _JUMP = 0.01  # second difference of a value over a step, in its unit, above whi
 
 
 def central_slopes(values: Callable[[Floats], Floats], point: Floats, steps: Floats | float) -> Floats:
-    """Derivatives of values by central differences; zero where a value jumps.
+    """Derivatives of values by central differences, shape (k, d) of a point (d,), by steps (d,); zero at a jump.
 
-    A sample near snap-off may be in contact on one side of the point and released on the other. Its value then jumps;
-    this is not a slope but a limit of the possible contours.
-
-    Shapes: point (d,), steps (d,) → (k, d).
+    A value jumps if a sample is in contact on one side of the point alone: that is a limit of contours, and no slope.
     """
     steps = np.broadcast_to(np.asarray(steps, dtype=float), point.shape)
     moves = np.diag(steps)

@@ -15,8 +15,7 @@ Function = Callable[[Index, Floats], tuple[Floats, Floats]]
 
 
 def bound_ends(function: Function, lo: Floats, hi: Floats, near: Floats) -> None:
-    """Replace infinite ends of brackets of falling functions, in place: go outward from `near`, twice as far each time,
-    until the root is passed."""
+    """Replace infinite ends of brackets of falling functions, in place, by points beyond the root, seen from `near`."""
     for end, outward in ((lo, -1.0), (hi, 1.0)):
         open_ended, way = np.flatnonzero(~np.isfinite(end)), 1.0
         while open_ended.size and way < _FARTHEST:
@@ -26,10 +25,7 @@ def bound_ends(function: Function, lo: Floats, hi: Floats, near: Floats) -> None
 
 
 def falling_root(function: Function, lo: Floats, hi: Floats, start: Floats | None = None) -> Floats:
-    """Roots of functions that are positive at `lo` and not positive at `hi`, by Newton's method within the bracket.
-
-    Shapes: lo, hi (n,), start (n,) → (n,).
-    """
+    """Roots, shape (n,), of functions that are positive at `lo` and not at `hi`, by Newton's method in the bracket."""
     roots = 0.5 * (lo + hi) if start is None else start.astype(float)
     x, before = roots, np.abs(hi - lo)
     settled = _ROUNDING * before

@@ -13,9 +13,9 @@ def evenly_spread(points: int, most: int) -> Index:
 
 
 def resampled(weights: Floats, count: int, rng: np.random.Generator | np.random.RandomState) -> Index:
-    """Return `count` indices, increasing, each as often as its weight demands, rounded up or down at random.
+    """Return `count` increasing indices, each as often as its weight, of any sum, demands, rounded at random.
 
-    This is systematic resampling (Kitagawa 1996, doi 10.2307/1390750); weights need not add up to one.
+    This is systematic resampling (Kitagawa 1996, doi 10.2307/1390750).
     """
     level = np.cumsum(weights)
     picked = np.searchsorted(level / level[-1], (np.arange(count) + rng.random()) / count)

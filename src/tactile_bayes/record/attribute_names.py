@@ -29,7 +29,7 @@ def unused(attrs: Mapping[str, Any]) -> list[str]:
 
 
 def misspelt(name: str, value: Any) -> str | None:
-    """Return why an attribute is probably a misspelt one of the rod, the load cell or the units; else None.
+    """Return why an attribute is probably a misspelt one; else None.
 
     Numbers under a name that begins with `rod_` or `load_cell_` are, and texts if the name is similar to a known one.
     """
@@ -73,10 +73,7 @@ def no_entry(name: str, prefix: str = "load_cell_") -> str:
 
 
 def _likely(name: str, prefix: str = "") -> str | None:
-    """Return the known name that a name is, apart from case, separators and a few letters; else None.
-
-    With a prefix the rest of the name decides.
-    """
+    """Return the known name with a prefix that a name is, apart from case, separators and a few letters; else None."""
     letters = _letters(name.removeprefix(prefix))
     for known in _KNOWN:
         if known.startswith(prefix) and is_misspelling(letters, _letters(known.removeprefix(prefix))):

@@ -19,13 +19,8 @@ from tactile_bayes.record.table import Source
 
 # Properties by which a rod differs from a straight, uniform one.
 _SHAPE = (
-    "rest_curvature",
-    "taper",
-    "rigidity_profile",
-    "rest_curvature_deviation",
-    "stem",
-    "rest_shape_modes",
-    "taper_deviation",
+    *("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation"),
+    *("stem", "rest_shape_modes", "taper_deviation"),
 )
 # Points at which properties along rods are compared, and the difference over the largest value that counts as zero.
 _POINTS, _SAME = 101, 1e-9
@@ -65,23 +60,22 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
             "state them as attributes (in a CSV file by header lines '# rod_length: 0.1 [m]' and "
             "'# rod_flexural_rigidity: 1.2e-05 [N m²]')"
         )
-    length = _quantity("rod_length", attrs["rod_length"], source)
-    rigidity = _quantity("rod_flexural_rigidity", attrs["rod_flexural_rigidity"], source)
-    diameter = _quantity("rod_diameter", attrs.get("rod_diameter", 0.0), source)
-    shape = {name: attrs[f"rod_{name}"] for name in _SHAPE if f"rod_{name}" in attrs}
-    for name, value in shape.items():
-        is_text = isinstance(value, str) and value.lstrip().startswith("{")
+    names = ("length", "flexural_rigidity", "diameter", *_SHAPE)
+    stated = {name: attrs[f"rod_{name}"] for name in names if f"rod_{name}" in attrs}
+    for name, value in stated.items():
+        is_text = name in _SHAPE and isinstance(value, str) and value.lstrip().startswith("{")
         if not is_text and name != "rest_shape_modes":
-            shape[name] = _quantity(f"rod_{name}", value, source)
+            stated[name] = _quantity(f"rod_{name}", value, source)
     try:
-        rod = Rod(length, rigidity, diameter, **shape)
+        rod = Rod(**stated)
     except ParameterError as error:
         raise source.error(str(error)) from error
     if units == "dimensionless" and not rod.is_dimensionless:
-        raise source.error(
-            f"the record is dimensionless, but states rod_length {length!r} and rod_flexural_rigidity {rigidity!r}, "
-            "which are the units there, 1.0: if the columns are SI, say so in 'units'; else remove the two"
+        what = "the record is dimensionless, but states "
+        what += (
+            f"rod_length {rod.length!r} and rod_flexural_rigidity {rod.flexural_rigidity!r}, which are the units there"
         )
+        raise source.error(f"{what}, 1.0: if the columns are SI, say so in 'units'; else remove the two")
     return rod
 
 
@@ -123,17 +117,15 @@ def completed_attributes(
         completed = {"load_cell_frame": frame, **completed}
         stated_in = stated_frame(completed, source)
         if stated_in != frame:
-            raise source.error(
+            what = (
                 f"the record states load_cell_frame {stated_in!r}, but {frame!r} was given: leave out the one that is "
-                "wrong; to convert a record use in_frame(record, frame)"
             )
+            raise source.error(f"{what}wrong; to convert a record use in_frame(record, frame)")
     if "units" not in completed:
         of_the_rod = [name for name in attrs if name not in without_rod(attrs)]
         if of_the_rod:
-            raise source.error(
-                f"{of_the_rod[0]!r} is stated, but no units: state units 'SI' or 'dimensionless' "
-                "(in a CSV file by a header line '# units: SI')"
-            )
+            what = f"{of_the_rod[0]!r} is stated, but no units: state units 'SI' or 'dimensionless' "
+            raise source.error(f"{what}(in a CSV file by a header line '# units: SI')")
         rod = rod or Rod()
         completed["units"] = "dimensionless" if rod.is_dimensionless else "SI"
     if rod is None:
@@ -141,10 +133,9 @@ def completed_attributes(
     completed = {**rod_attributes(rod), **completed}
     stated = stated_rod(completed, source)
     if not same_rod(stated, rod):
+        way_out = "leave out the one that is wrong"
         if completed["units"] == "dimensionless":
             way_out = "read it without a rod, and convert it with to_si(record, rod)"
-        else:
-            way_out = "leave out the one that is wrong"
         raise source.error(f"the {completed['units']} record states {stated}, but {rod} was given: {way_out}")
     return completed
 
@@ -168,10 +159,8 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
             raise source.attribute_error(name, f"is {plain!r}, but {why}")
         if isinstance(plain, str) and (reason := not_storable(plain)):
             raise source.attribute_error(name, f"{reason}, which no file can store: remove it")
-        is_storable = isinstance(plain, str | float) or (
-            isinstance(plain, int) and not isinstance(plain, bool) and -(2**63) <= plain < 2**63
-        )
-        if not is_storable:
+        is_whole = isinstance(plain, int) and not isinstance(plain, bool) and -(2**63) <= plain < 2**63
+        if not (is_whole or isinstance(plain, str | float)):
             raise source.attribute_error(name, f"is {value!r}: attributes of a record are strings or numbers")
         checked[name] = plain
     return checked

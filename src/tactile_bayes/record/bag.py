@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.record.bag_messages import Field, Topic, example, messages_of, opened_bag
 from tactile_bayes.record.origin import origins_of
-from tactile_bayes.record.quantity import converted, unit_of
+from tactile_bayes.record.quantity import converted, same_quantity
 from tactile_bayes.record.schema import CHANNELS, MEASURED
 from tactile_bayes.record.table import Cells, Source, Table
 
@@ -34,36 +34,28 @@ def is_bag(path: Path) -> bool:
 
 
 def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read the fields of messages that a record needs, one sample for each message with a load.
+    """Read the fields of messages that a record needs, one sample for each message with the first load.
 
-    Fields are named as topic, point, and the field's own path, like "/wrench.wrench.force.x"; elements of arrays have
-    numbers, like "/motor.data.0", or the names that are in the same message, like "/joint_states.position.wrist". A
-    message without that name is none of that column. Each message with the first load is a sample. Drive angle and
-    base are interpolated linearly to its time, an angle after its jumps by a turn are undone; other loads are those of
-    the nearest message, and everything else is that of the last one. A sample is left out if the field of another
-    column has no values around it, or pauses there for more than five times its usual interval; NaN of what is
-    interpolated is no value.
+    Drive angle and base are interpolated linearly to its time, an angle after its jumps by a turn are undone; other
+    loads are those of the nearest message, and everything else is that of the last one. A sample is left out if another
+    column has no values around it, or pauses there for more than five times its usual interval.
 
-    The time of a message is that of its header, if its topic has any, and a message without is none. All times are
-    those of reception if the headers of a topic go back, state one time for different values, or have another clock
-    than other topics. A message that is in the bag again counts once.
+    Times are those of headers, or all those of reception if headers of a topic go back, state one time for different
+    values, or have another clock than other topics. A message that is in the bag again counts once.
     """
     source = Source(str(path))
     with opened_bag(path, source) as reader:
         names = sorted({connection.topic for connection in reader.connections}, key=len, reverse=True)
         wanted = {topic for text in columns.values() if (topic := next((t for t in names if f"{t}." in text), None))}
         if not wanted:
-            raise source.error(
-                f"no column is of one of its topics: write columns like drive_angle={example(reader)}; the bag has "
-                + (", ".join(sorted(names)) or "no topics")
-            )
+            what = f"no column is of one of its topics: write columns like drive_angle={example(reader)}; the bag has "
+            raise source.error(what + (", ".join(sorted(names)) or "no topics"))
         topics = messages_of(reader, wanted)
     asked = _asked(topics, columns, source)
     faults = []
     for by_header in (True, False):
         try:
-            times = _times(topics, by_header)
-            return _table(topics, times, asked, source)
+            return _table(topics, _times(topics, by_header), asked, source)
         except _ClockError as fault:
             faults.append(fault)
     raise source.error(f"{faults[0]}; by the times of reception, {faults[1]}: record it again, or take another topic")
@@ -142,20 +134,17 @@ def _refuse_mixed(column: _Column, topic: Topic, source: Source) -> None:
             raise source.error(f"{column.name} is not in every message of {column.topic}: {way}")
         frames = topic.fields.get("header.frame_id")
         if frames is not None and len(several := sorted(set(frames.values))) > 1:
-            raise source.error(
-                f"the messages of {column.topic} are of several frames, {', '.join(map(repr, several))}: record one "
-                "sensor on a topic"
-            )
+            what = f"the messages of {column.topic} are of several frames, {', '.join(map(repr, several))}"
+            raise source.error(f"{what}: record one sensor on a topic")
     publishers = np.array(topic.publishers)[field.messages]
     if np.count_nonzero(np.diff(publishers)) >= np.unique(publishers).size > 1:
         raise source.error(f"{column.name} comes from several publishers at a time: record one on a topic")
 
 
 def _turn_in(unit: str | None) -> float:
-    """Return a turn in a unit; by default, and in what is no unit, in radians."""
-    radian, known = unit_of("rad"), None if unit is None else unit_of(unit)
-    assert radian is not None
-    return 2.0 * np.pi if known is None else float(converted(2.0 * np.pi, radian, known))
+    """Return a turn in a unit; by default, and in what is no unit of angles, in radians."""
+    pair = same_quantity("rad", unit or "rad")
+    return 2.0 * np.pi if pair is None else float(converted(2.0 * np.pi, *pair))
 
 
 def _times(topics: Mapping[str, Topic], by_header: bool) -> dict[str, Index]:

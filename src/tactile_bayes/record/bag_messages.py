@@ -21,24 +21,20 @@ _LONGEST = 64  # largest number of elements of an array that are columns
 
 @dataclass(frozen=True)
 class Field:
-    """Values of a field in the order of reception, with the numbers of the messages that have it.
+    """Values of a field in the order of reception."""
 
-    `labels` are names that messages state for an element, as of a joint; `is_named` if it is called by one, not a
-    number.
-    """
-
-    is_named: bool
-    messages: list[int] = field(default_factory=list)
+    is_named: bool  # whether it is called by a label, not a number
+    messages: list[int] = field(default_factory=list)  # numbers of those that have it
     values: list[Any] = field(default_factory=list)
-    labels: set[str | None] = field(default_factory=set)
+    labels: set[str | None] = field(default_factory=set)  # names that messages state for it, as of a joint
 
 
 @dataclass(frozen=True)
 class Topic:
-    """Messages of a topic in the order of reception, with the times of it and of headers, 0 where none is [ns]."""
+    """Messages of a topic in the order of reception."""
 
-    received: list[int] = field(default_factory=list)
-    stamps: list[int] = field(default_factory=list)
+    received: list[int] = field(default_factory=list)  # times of reception [ns]
+    stamps: list[int] = field(default_factory=list)  # times of headers [ns], 0 where there is none
     publishers: list[int] = field(default_factory=list)
     fields: dict[str, Field] = field(default_factory=dict)
 
@@ -67,9 +63,8 @@ def opened_bag(path: Path, source: Source) -> Iterator[AnyReader]:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
-        raise source.error(
-            "bags are read by the package rosbags, which is not installed: pip install 'tactile-bayes[ros]'"
-        ) from error
+        what = "bags are read by the package rosbags, which is not installed: pip install 'tactile-bayes[ros]'"
+        raise source.error(what) from error
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             yield reader
@@ -103,8 +98,7 @@ def _fields(
 ) -> Iterator[tuple[str, Any, str | None, bool]]:
     """Yield numbers and texts of a message: name, value, label of the element, and whether the name has the label.
 
-    Elements of an array have their numbers, and also their labels, if a list of texts of that length is beside it or
-    above it.
+    Elements of an array have numbers, and labels if a list of texts of that length is beside or above it.
     """
     if isinstance(message, bool | int | float | str | np.generic):
         yield lead.rstrip("."), message, label, is_named

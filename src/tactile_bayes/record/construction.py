@@ -18,14 +18,12 @@ from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import checked_record
 
-_FRAME = "the DataFrame"  # name of a table of pandas in messages
-
 
 def table_of_columns(columns: Mapping[str, Any] | pd.DataFrame, attrs: Mapping[str, Any] | None) -> Table:
     """Return a table of columns by name, in which a single value stands for a whole column."""
     check_mapping("attrs", attrs, "give strings and numbers by name")
     if isinstance(columns, pd.DataFrame):
-        return Table(_cells_of_frame(columns), attrs or {}, Source(_FRAME))
+        return Table(_cells_of_frame(columns), attrs or {}, Source("the DataFrame"))
     if not isinstance(columns, Mapping) or isinstance(columns, xr.DataTree):
         raise refused("columns", columns, "give arrays by name of a column, or a pandas DataFrame")
     cells = {str(name): (np.array(unmasked(values)), getattr(values, "attrs", {})) for name, values in columns.items()}
@@ -56,24 +54,12 @@ def _cells_of_frame(frame: pd.DataFrame) -> dict[str, Cells]:
 
 
 def completed_record(table: Table, rod: Rod | None, missing: Collection[str], frame: Frame | None) -> xr.Dataset:
-    """Make a record from a table, with the given rod, missing channels and frame."""
-    columns = _with_missing(table, missing)
-    return checked_record(Table(columns, completed_attributes(table.attrs, rod, frame, table.source), table.source))
-
-
-def _with_missing(table: Table, missing: Collection[str]) -> dict[str, Cells]:
-    """Add an empty column for each channel that is declared missing."""
+    """Make a record from a table, with the given rod, missing channels, which have empty columns, and frame."""
     columns = dict(table.columns)
     for name in missing:
-        if name not in columns:
-            columns[name] = (np.full(table.samples, np.nan), {})
-        elif not all(_is_empty(cell) for cell in columns[name][0].tolist()):
-            raise table.source.error(
-                f"column {name!r} has values, but is declared missing: do not declare it, or empty the column"
-            )
-    return columns
-
-
-def _is_empty(cell: Any) -> bool:
-    number = number_in(cell)
-    return number is not None and math.isnan(number)
+        numbers = list(map(number_in, columns[name][0].tolist())) if name in columns else []
+        if not all(number is not None and math.isnan(number) for number in numbers):
+            what = f"column {name!r} has values, but is declared missing: do not declare it, or empty the column"
+            raise table.source.error(what)
+        columns.setdefault(name, (np.full(table.samples, np.nan), {}))
+    return checked_record(Table(columns, completed_attributes(table.attrs, rod, frame, table.source), table.source))

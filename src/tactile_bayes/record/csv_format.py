@@ -74,10 +74,7 @@ def _quoted_cells(texts: list[str]) -> list[str]:
 
 
 def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read a table as it is in the file; columns of a record have the right kind of cells.
-
-    Empty columns without a name are left out: a separator at the end of every line makes one.
-    """
+    """Read a table as it is in the file; columns of a record have the right kind of cells."""
     with open(path, "rb") as file:
         return read_csv_content(file, str(path), columns)
 
@@ -100,12 +97,12 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
         last += 1
         source = Source(called, heads={**header.heads, **dict.fromkeys(units, last)})
     described = {name: cast(Kind, header.descriptions[name]["kind"]) for name in names if name in header.descriptions}
-    # Columns without a name are called by their position until they are left out; no name begins with a blank.
+    # Columns without a name, as of a separator at the end of every line, are called by their position, and left out.
     places = [name or f" (column {place})" for place, name in enumerate(header.names, start=1)]
     unnamed = {name: place for place, name in enumerate(places, start=1) if name not in names}
     for name in unnamed:
         described[name] = "text"
-    layout = Layout(places, header.delimiter, last, meant, described)
+    layout = Layout(places, header.delimiter, last, meant, described, "." if header.delimiter == "," else None)
     text, note = without_cut_row(text, header, last)
     values, lines = read_rows(text, layout, Source(called))
     for name, place in unnamed.items():
@@ -128,10 +125,8 @@ def _with_found_names(header: Header, names: list[str], source: Source) -> Heade
         if found is None:  # of a column that was removed
             continue
         if found in header.descriptions:
-            raise source.line_error(
-                heads[described],
-                f"it describes the column {found!r}, as line {heads[found]} does: keep one",
-            )
+            what = f"it describes the column {found!r}, as line {heads[found]} does: keep one"
+            raise source.line_error(heads[described], what)
         descriptions[found], heads[found] = descriptions.pop(described), heads.pop(described)
     return replace(header, descriptions=descriptions, heads=heads)
 
@@ -144,28 +139,26 @@ def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Map
     what = f"this line was taken for the column names ({', '.join(names)}), "
     for number, line in enumerate(below, start=header.line + 1):
         if any_meant(columns, cells_in(line)):
-            raise source.line_error(
-                header.line, f"{what}but they are in line {number}: put # before the lines above that"
-            )
+            what += f"but they are in line {number}: put # before the lines above that"
+            raise source.line_error(header.line, what)
     widths = [len(cells_in(line, header.delimiter)) for line in below]
     if len(header.names) == 1 or len(header.names) not in widths:  # another delimiter separates the cells there
         widths = [len(cells_in(line)) for line in below]
     if max(widths, default=0) > len(header.names):
-        raise source.line_error(
-            header.line,
-            f"{what}but there are more cells in lines below: if the names are further down, put # before the lines "
-            "above them; else write one cell per column, with a point in decimals",
-        )
+        what += "but there are more cells in lines below: if the names are further down, put # before the lines above "
+        what += "them; else write one cell per column, with a point in decimals"
+        raise source.line_error(header.line, what)
 
 
 def _refuse_content(texts: NDArray[Any], place: int, lines: NDArray[np.int64], head: int, source: Source) -> None:
     """Refuse a column without a name that is not empty."""
     for sample in np.flatnonzero(texts != "").tolist():
-        text = str(texts[sample])
-        if text.strip():
-            raise source.line_error(
-                head, f"column {place} has no name: name it, or remove it (in line {lines[sample]} it has {text!r})"
-            )
+        if texts[sample].strip():
+            raise source.line_error(head, _without_name(place, lines[sample], str(texts[sample])))
+
+
+def _without_name(place: int, line: int, text: str) -> str:
+    return f"column {place} has no name: name it, or remove it (in line {line} it has {text!r})"
 
 
 def _with_usual_line_ends(file: BinaryIO) -> BinaryIO:
@@ -179,17 +172,14 @@ def _with_usual_line_ends(file: BinaryIO) -> BinaryIO:
 def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], source: Source) -> dict[str, str]:
     """Read the units of columns if the line below their names is a row of units; the file is then positioned after it.
 
-    In such a row a measured column has a unit, and no cell is a number; a unit of another column, like °C, may be
-    unknown. Pure numbers alone are no row of units: 1 and - may be units, but readings too.
+    There a measured column has a unit other than 1 and -, which may be readings, and no cell is a number.
     """
     cells = cells_in(next(iter(lines_below(file)), ""), header.delimiter)
     texts = [_without_brackets(cell) for cell in cells]
     units = [unit_of(text) if cell else None for cell, text in zip(cells, texts, strict=True)]
     is_number = [unit is None and number_with_comma(text) is not None for unit, text in zip(units, texts, strict=True)]
-    is_measured = [
-        unit is not None and not unit.is_number and meant.get(name) == "number"
-        for name, unit in zip(header.names, units, strict=False)
-    ]
+    pairs = zip(header.names, units, strict=False)
+    is_measured = [unit and not unit.is_number and meant.get(name) == "number" for name, unit in pairs]
     if len(cells) != len(header.names) or any(is_number) or not any(is_measured):
         return {}
     found = {}
@@ -207,22 +197,15 @@ def _refuse_unit(
     """Refuse an unknown unit in a row of units, or one that differs from that of its column."""
     number = header.line + 1
     if not name:
-        raise source.line_error(
-            header.line, f"column {place} has no name: name it, or remove it (in line {number} it has {text!r})"
-        )
+        raise source.line_error(header.line, _without_name(place, number, text))
     if unit is None and is_measured:
-        raise source.line_error(
-            number,
-            f"this looks like a row of units, but {text!r} below {name!r} is none that is known here: empty that cell; "
-            f"or remove the row, and give units with the columns, {file_entry('force_x', 'Fx[mN]')}",
-        )
+        what = f"this looks like a row of units, but {text!r} below {name!r} is none that is known here: empty that "
+        what += f"cell; or remove the row, and give units with the columns, {file_entry('force_x', 'Fx[mN]')}"
+        raise source.line_error(number, what)
     stated = header.descriptions.get(name, {}).get("units")
     if stated is not None and (is_measured or None not in (unit, unit_of(stated))) and units_disagree(stated, text):
-        raise source.line_error(
-            number,
-            f"column {name!r} is in [{text}] here, and in [{stated}] in line {header.heads[name]}: leave out the one "
-            "that is wrong",
-        )
+        what = f"column {name!r} is in [{text}] here, and in [{stated}] in line {header.heads[name]}"
+        raise source.line_error(number, f"{what}: leave out the one that is wrong")
 
 
 def _without_brackets(cell: str) -> str:

@@ -14,7 +14,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.attribute_names import stray_attribute
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
-from tactile_bayes.record.quantity import accepted_units, converted, unit_of
+from tactile_bayes.record.quantity import accepted_units, converted, same_quantity
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
 from tactile_bayes.record.spelling import visible
 from tactile_bayes.record.table import Source
@@ -31,7 +31,7 @@ _FORMAT_LINE = re.compile(r"tactile_bayes record, format (?P<format>[0-9]+)")
 _HEADER_LINE = re.compile(rf"(?P<key>{_NAME}|{_QUOTED})\s*:\s*+(?P<value>.*)")
 _COLUMN_LINE = re.compile(
     rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*+(?P<kind>\w++)\s*+"
-    rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*+(?P<long_name>.*)"
+    rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*+(?P<long_name>.+)?"
 )
 _STRAY_COLUMN = re.compile(rf"column\s+(?:{_NAME}|{_QUOTED})\s*[:=]|column\s[^:]*:\s*+(?:integer|number|text)\b")
 _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
@@ -39,19 +39,15 @@ _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
 
 @dataclass(frozen=True)
 class Header:
-    """Content of a CSV file before its first sample; columns without a name have the name "".
+    """Content of a CSV file before its first sample."""
 
-    `descriptions` have `kind`, `units` and `long_name`; `heads` and `stated` are the lines of the descriptions and of
-    the attributes, and `line` is that of the names. Quantities in `attrs` are in SI, or in units of the rod.
-    """
-
-    attrs: Mapping[str, Any]
-    descriptions: Mapping[str, Mapping[str, str]]
-    heads: Mapping[str, int]
-    stated: Mapping[str, int]
-    names: list[str]
+    attrs: Mapping[str, Any]  # quantities in the units of the record
+    descriptions: Mapping[str, Mapping[str, str]]  # kind, units and long_name of columns
+    heads: Mapping[str, int]  # lines of the descriptions
+    stated: Mapping[str, int]  # lines of the attributes
+    names: list[str]  # "" for a column without
     delimiter: str
-    line: int
+    line: int  # that of the names
     remarks: tuple[str, ...]
 
 
@@ -121,32 +117,23 @@ def read_header(file: BinaryIO, source: Source) -> Header:
         if match := _FORMAT_LINE.fullmatch(content):
             found = integer_in(match["format"])
             if found is None or found > FORMAT:
-                raise source.line_error(
-                    number,
-                    f"the file has format {match['format']}, but this version of tactile_bayes reads formats up to "
-                    f"{FORMAT}: update it",
-                )
+                what = f"the file has format {match['format']}, but this version of tactile_bayes reads formats up to "
+                raise source.line_error(number, f"{what}{FORMAT}: update it")
         elif match := _COLUMN_LINE.fullmatch(content):
             if match["kind"] not in KINDS.values():
-                raise source.line_error(
-                    number, f"{match['kind']!r} is no kind of column: write integer, number or text"
-                )
-            description = {"kind": match["kind"]}
-            if match["units"] is not None:
-                description["units"] = _unquoted(match["units"])
-            if match["long_name"]:
-                description["long_name"] = _unquoted(match["long_name"])
-            descriptions[_unquoted(match["name"])] = description
-            heads[_unquoted(match["name"])] = number
+                what = f"{match['kind']!r} is no kind of column: write integer, number or text"
+                raise source.line_error(number, what)
+            description = {key: _unquoted(text) for key, text in match.groupdict().items() if text is not None}
+            name = description.pop("name")
+            descriptions[name], heads[name] = description, number
         elif match := _HEADER_LINE.fullmatch(content):
             key = _unquoted(match["key"])
             if key in stated:
                 raise source.line_error(number, f"{key!r} is stated a second time: keep one of the lines")
             stated[key] = (number, match["value"])
         elif (seen := visible(content)) != content and (_COLUMN_LINE.fullmatch(seen) or _HEADER_LINE.fullmatch(seen)):
-            raise source.line_error(
-                number, f"{content!r} has characters that cannot be seen, or odd blanks: write {seen!r}"
-            )
+            what = f"{content!r} has characters that cannot be seen, or odd blanks: write {seen!r}"
+            raise source.line_error(number, what)
         else:
             remarks[number] = content
     raise source.error(f"there is no line of column names: add one, {','.join(MEASURED)}")
@@ -156,11 +143,9 @@ def _refuse_stray(remarks: Mapping[int, str], stated: Mapping[str, int], source:
     """Refuse a commented line that states an attribute or a column in a form that is not read."""
     for line, text in remarks.items():
         if _STRAY_COLUMN.match(text):
-            raise source.line_error(
-                line,
-                f"{text!r} describes a column in a form that is not read: write '# column NAME: KIND [UNIT] TEXT', "
-                "the kind being integer, number or text, with a name in quotation marks if it has blanks or brackets",
-            )
+            what = f"{text!r} describes a column in a form that is not read: write '# column NAME: KIND [UNIT] TEXT', "
+            what += "the kind being integer, number or text, and a name with blanks or brackets in quotation marks"
+            raise source.line_error(line, what)
         found = stray_attribute(text)
         if found is not None and (found[0] not in stated or text.startswith(found[0])):  # else words about it
             raise source.line_error(line, f"{text!r} looks like the attribute {found[0]!r}, but {found[1]}")
@@ -177,19 +162,13 @@ def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
         yield text.lstrip("\ufeff\u200b")
 
 
-def _is_number(stated: tuple[int, str] | None) -> bool:
-    """Return whether a header line states a number, and not polynomials along the rod."""
-    return stated is not None and not stated[1].startswith("{")
-
-
 def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) -> dict[str, str | int | float]:
     """Parse the values of header lines; known quantities are converted, and a unit of one of them means SI."""
     attrs = {key: _header_value(text) for key, (_, text) in stated.items()}
-    matches = {key: _QUANTITY.fullmatch(stated[key][1]) for key in ATTRIBUTE_UNITS if _is_number(stated.get(key))}
-    if "units" not in attrs and any(
-        match is not None and match["unit"] is not None and ATTRIBUTE_UNITS[key] not in ("1", "rad")
-        for key, match in matches.items()
-    ):
+    known = {key: text for key, (_, text) in stated.items() if key in ATTRIBUTE_UNITS}
+    matches = {key: _QUANTITY.fullmatch(text) for key, text in known.items() if not text.startswith("{")}  # polynomials
+    with_unit = [key for key, match in matches.items() if match is not None and match["unit"] is not None]
+    if "units" not in attrs and any(ATTRIBUTE_UNITS[key] not in ("1", "rad") for key in with_unit):
         attrs["units"] = "SI"
     for key, match in matches.items():
         line, text = stated[key]
@@ -198,23 +177,19 @@ def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) ->
         if match is None or number is None:
             raise source.line_error(line, f"{key} is {text!r}: give a number [{expected}]")
         if match["unit"] is not None:
-            unit, wanted = unit_of(match["unit"]), unit_of(expected)
-            if unit is None or wanted is None or unit.dimension != wanted.dimension:
-                raise source.line_error(
-                    line, f"{key} is in [{match['unit']}], but takes {accepted_units(expected)}: convert it"
-                )
-            number = converted(number, unit, wanted)
+            pair = same_quantity(match["unit"], expected)
+            if pair is None:
+                what = f"{key} is in [{match['unit']}], but takes {accepted_units(expected)}: convert it"
+                raise source.line_error(line, what)
+            number = converted(number, *pair)
         attrs[key] = number
     return attrs
 
 
 def _header_value(text: str) -> str | int | float:
     """Parse a value in a header: a number, a text in quotation marks, or else the text itself."""
-    if is_integer_text(text):
-        number: float | None = integer_in(text)
-    else:
-        number = number_in(text) if text else None
-    return _unquoted(text) if number is None else number
+    number: float | None = integer_in(text) if is_integer_text(text) else number_in(text)
+    return _unquoted(text) if number is None or not text else number
 
 
 def _unpadded(text: str) -> str:
@@ -274,6 +249,6 @@ def _counted(lines: Sequence[str], delimiter: str) -> bool:
 
 
 def _refuse_equal(names: list[str], number: int, source: Source) -> None:
-    for index, column in enumerate(names):
-        if column and column in names[:index]:
+    for column in filter(None, names):
+        if names.count(column) > 1:
             raise source.line_error(number, f"there are two columns {column!r}: rename or remove one of them")

@@ -24,24 +24,15 @@ _CHUNK = 1 << 16  # bytes that become columns at once; larger ones take longer, 
 
 @dataclass
 class Layout:
-    """Known properties of the columns of a file before they are read; `line` is the one above the first row.
-
-    `meant` are the kinds of the columns of a record, `described` those of others that the header describes, and
-    `guessed` those of the remaining ones, inferred from their cells. If the delimiter is no comma, a comma may separate
-    decimals.
-    """
+    """Known properties of the columns of a file before they are read, and kinds that their cells show."""
 
     names: list[str]
     delimiter: str
-    line: int
-    meant: Mapping[str, Kind]
-    described: Mapping[str, Kind]
+    line: int  # the one above the first row
+    meant: Mapping[str, Kind]  # of the columns of a record
+    described: Mapping[str, Kind]  # of others that the header describes
+    decimal: str | None  # separator of decimals, if it is known
     guessed: dict[str, Kind] = field(default_factory=dict)
-    decimal: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.delimiter == ",":
-            self.decimal = "."
 
     def kind(self, name: str) -> Kind | None:
         """Return the kind of a column, None if it is not known yet."""
@@ -55,17 +46,14 @@ class _WrongGuessError(Exception):
 def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
     """Read the columns of a file from its position, as int64, float64 or text, and the first line of each sample.
 
-    The memory needed is little more than that of the result. Text is returned as by `text_array`. Columns without a
-    known kind are integers, else numbers (empty cells are NaN), else text.
+    Columns without a known kind are integers, else numbers (empty cells are NaN), else text.
     """
     begin = file.tell()
     most = 1 + sum(block.count(b"\n") + block.count(b"\r") for block in iter(lambda: file.read(_CHUNK), b""))
     while True:
         file.seek(begin)
-        try:
+        with suppress(_WrongGuessError):
             return _read_once(_chunks(file), layout, most, source)
-        except _WrongGuessError:
-            continue
 
 
 def _read_once(
@@ -96,8 +84,9 @@ def _chunks(file: BinaryIO) -> Iterator[bytes]:
 
 
 class _Values:
-    """The values of a column one after the other. Numbers go into one array: memory that is never written to costs
-    nothing, and that of many small arrays would not be given back. A word that comes again is kept once.
+    """The values of a column one after the other: words, each kept once, or numbers in one array.
+
+    Memory that is never written to costs nothing, and that of many small arrays would not be given back.
     """
 
     def __init__(self, most: int) -> None:
@@ -147,20 +136,15 @@ def _read_cells(
                 rows.append(row)
                 begins.append(begin)
             elif row:
-                raise source.row_error(
-                    begin,
-                    f"there are {len(row)} cells in {width} columns "
-                    f"({', '.join(map(str.strip, layout.names))}): write one per column, with a point in decimals"
-                    + ("" if layout.delimiter == "," else " or a comma, but none between thousands"),
-                )
+                what = f"there are {len(row)} cells in {width} columns ({', '.join(map(str.strip, layout.names))})"
+                way = "" if layout.delimiter == "," else " or a comma, but none between thousands"
+                raise source.row_error(begin, f"{what}: write one per column, with a point in decimals{way}")
             begin = above + 1 + reader.line_num
             if reader.line_num == len(lines):
                 break
     except csv.Error as error:
-        raise source.row_error(
-            begin,
-            f"the line cannot be read ({error}): correct it; a quotation mark that is not closed takes in what follows",
-        ) from error
+        what = f"the line cannot be read ({error}): correct it; "
+        raise source.row_error(begin, f"{what}a quotation mark that is not closed takes in what follows") from error
     here = Source(source.name, begins, aliases=source.aliases)
     texts = dict(zip(layout.names, zip(*rows, strict=True) if rows else [()] * width, strict=True))
     order = sorted(layout.names, key=lambda name: name not in layout.meant)  # these show the decimal separator

@@ -10,37 +10,29 @@ from typing import BinaryIO
 from tactile_bayes.record.table import Source
 
 CUT_BY_NUL = (
-    "from here on there are NUL characters (0x00) alone, as a power failure leaves them: remove them, and the row that "
-    "they cut short"
+    "from here on there are NUL characters (0x00) alone, as a power failure leaves them: remove them and this row"
 )
 WITH_NUL = "there is a NUL character (0x00), which is no text: remove it"
 _CHUNK = 1 << 21
 _SAVE = "save it as CSV in UTF-8"
 _BEYOND_ASCII = re.compile("[^\0-\x7f]")
-_BINARY = {
-    b"\x89HDF\r\n\x1a\n": "a NetCDF (HDF5) file: rename it to end in .nc",
-    **dict.fromkeys(
-        (b"CDF\x01", b"CDF\x02", b"CDF\x05"),
-        "a NetCDF file of the classic kind: convert it to NetCDF-4 (nccopy -k nc4), with a name that ends in .nc",
-    ),
-    b"PK\x03\x04": f"a workbook of a spreadsheet, or another zip archive: {_SAVE}",
-}
-_MARKS = {  # a longer mark precedes a shorter one with the same beginning
-    codecs.BOM_UTF32_LE: "UTF-32",
-    codecs.BOM_UTF32_BE: "UTF-32",
-    codecs.BOM_UTF16_LE: "UTF-16",
-    codecs.BOM_UTF16_BE: "UTF-16",
+# What the first bytes of other files show; a longer mark precedes a shorter one with the same beginning.
+_NO_CSV, _WIDE = "this is no CSV file, but {}", f"the file is {{}} text, as its first bytes say: {_SAVE}"
+_CLASSIC = "a NetCDF file of the classic kind: convert it to NetCDF-4 (nccopy -k nc4), with a name that ends in .nc"
+_MARKS = {
+    b"\x89HDF\r\n\x1a\n": _NO_CSV.format("a NetCDF (HDF5) file: rename it to end in .nc"),
+    **dict.fromkeys((b"CDF\x01", b"CDF\x02", b"CDF\x05"), _NO_CSV.format(_CLASSIC)),
+    b"PK\x03\x04": _NO_CSV.format(f"a workbook of a spreadsheet, or another zip archive: {_SAVE}"),
+    **dict.fromkeys((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE), _WIDE.format("UTF-32")),
+    **dict.fromkeys((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE), _WIDE.format("UTF-16")),
 }
 
 
 def refuse_other_kinds(start: bytes, source: Source) -> None:
     """Refuse a file whose first bytes show another format."""
-    for mark, what in _BINARY.items():
+    for mark, what in _MARKS.items():
         if start.startswith(mark):
-            raise source.error(f"this is no CSV file, but {what}")
-    for mark, encoding in _MARKS.items():
-        if start.startswith(mark):
-            raise source.error(f"the file is {encoding} text, as its first bytes say: {_SAVE}")
+            raise source.error(what)
     if b"\0" in start[:2]:
         raise source.error(f"the file is no UTF-8 text, but looks like UTF-16: {_SAVE}")
 

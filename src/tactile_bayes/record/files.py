@@ -17,8 +17,7 @@ from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
 from tactile_bayes.record.table import Table
 from tactile_bayes.record.validation import validate
 
-_READERS = {".csv": read_csv, ".nc": read_netcdf_table}
-_WRITERS = {".csv": write_csv, ".nc": write_netcdf_record}
+_FORMATS = {".csv": (read_csv, write_csv), ".nc": (read_netcdf_table, write_netcdf_record)}
 
 
 def read_table(path: str | os.PathLike[str], columns: Mapping[str, str]) -> Table:
@@ -29,7 +28,7 @@ def read_table(path: str | os.PathLike[str], columns: Mapping[str, str]) -> Tabl
     if is_bag(path):
         return read_bag_table(path, columns)
     refuse_no_file(path)
-    return _READERS[_suffix(path)](path, columns)
+    return _FORMATS[_suffix(path)][0](path, columns)
 
 
 def refuse_no_file(path: Path) -> None:
@@ -88,13 +87,12 @@ def write_record(record: xr.Dataset, path: str | os.PathLike[str]) -> None:
     <BLANKLINE>
     """
     path = check_path("path", path)
-    write = _WRITERS[_suffix(path)]
-    record = validate(record)
-    write(record, path)
+    write = _FORMATS[_suffix(path)][1]
+    write(validate(record), path)
 
 
 def _suffix(path: Path) -> str:
     suffix = path.suffix.lower()
-    if suffix not in (".csv", ".nc"):
+    if suffix not in _FORMATS:
         raise RecordError(f"{path}: a record is a .csv or a .nc file, not {suffix or 'one without suffix'}: rename it")
     return suffix

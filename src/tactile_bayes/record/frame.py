@@ -18,12 +18,8 @@ from tactile_bayes.record.validation import validate
 
 # Entries of a load cell's data sheet that are valid only along its own axes; with errors of the encoder the angle
 # between the frames is not known.
-_BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"} | {
-    "degrees_of_freedom",
-    "relative_noise",
-    "lever_x",
-    "lever_y",
-}
+_BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"}
+_BOUND |= {"degrees_of_freedom", "relative_noise", "lever_x", "lever_y"}
 
 
 def frame_of(record: xr.Dataset) -> Frame:
@@ -103,10 +99,7 @@ def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Fl
 
 
 def to_fixed_axes(angle: Floats) -> Floats:
-    """Return matrices, shape (n, 3, 3), by which loads along axes turned by angles, shape (n,), are along fixed ones.
-
-    The loads are in the order of `CHANNELS`.
-    """
+    """Return matrices, shape (n, 3, 3), that turn loads (in the order of `CHANNELS`) back by angles, shape (n,)."""
     matrices = np.zeros((angle.size, 3, 3))
     matrices[:, 0, 0] = 1.0
     matrices[:, 1, 1] = matrices[:, 2, 2] = np.cos(angle)
@@ -121,9 +114,8 @@ def _refuse_bound_to_frame(record: xr.Dataset) -> None:
         entry = str(name).removeprefix("load_cell_")
         if name in ATTRIBUTE_UNITS and entry in _BOUND:
             raise RecordError(
-                f"its load cell's {entry}, {value!r}, holds along the axes that it measured: keep the record in the "
-                "frame in which it was measured, or take out what is known of the cell's errors "
-                "(LoadCell.corrected) and remove the attributes that are left"
+                f"its load cell's {entry}, {value!r}, holds along the axes that it measured: keep the record in that "
+                "frame, or take out what is known of the cell's errors (LoadCell.corrected) and remove what is left"
             )
 
 
@@ -135,16 +127,14 @@ def _values(record: xr.Dataset, name: str) -> Floats:
 def _refuse_half_a_force(names: tuple[str, str], forces: tuple[Floats, Floats], frame: Frame) -> None:
     """Refuse samples with only one component of the force."""
     for (name, values), (other, others) in permutations(zip(names, forces, strict=True)):
-        lacks = np.isnan(values) & ~np.isnan(others)
-        if not lacks.any():
+        lacks = np.flatnonzero(np.isnan(values) & ~np.isnan(others))
+        if not lacks.size:
             continue
+        takes = f"a force in the {frame} frame takes both of the other frame"
         if name in CHANNELS:
             raise RecordError(
-                f"{name} was not measured, and a force in the {frame} frame takes both of the other frame, so "
-                f"{other} would be lost too: keep the record in the frame in which it was measured; infer_contour "
-                "takes it as it is"
+                f"{name} was not measured, and {takes}, so {other} would be lost too: keep the record in the frame in "
+                "which it was measured; infer_contour takes it as it is"
             )
-        raise RecordError(
-            f"sample {int(np.argmax(lacks))} has a {other}, but no {name}, and a force in the {frame} frame takes both "
-            f"of the other frame: complete {name}, or remove {other}"
-        )
+        what = f"sample {lacks[0]} has a {other}, but no {name}, and {takes}"
+        raise RecordError(f"{what}: complete {name}, or remove {other}")

@@ -15,10 +15,9 @@ from tactile_bayes.record.validation import validate
 
 
 def record_hash(record: xr.Dataset) -> str:
-    """SHA-256 of the measured values: names, values and units of the columns of `MEASURED`, their frame, and the rod.
+    """SHA-256 of names, values and units of the columns of `MEASURED`, their frame, and the rod.
 
-    It does not depend on further columns, like those of the truth, on the order of columns, or on other attributes. A
-    record has the same hash before and after it is written to a file.
+    It does not depend on the order of columns, or on other columns and attributes, and is the same in every file.
     """
     record = validate(record)
     digest = hashlib.sha256()

@@ -19,14 +19,7 @@ import xarray as xr
 from xarray.backends import H5NetCDFStore, InMemoryDataStore
 
 from tactile_bayes.record import netcdf_content
-from tactile_bayes.record.netcdf_content import (
-    FileGroup,
-    UnsafeError,
-    content_of,
-    is_cut_short,
-    received,
-    time_limit,
-)
+from tactile_bayes.record.netcdf_content import FileGroup, UnsafeError, content_of, is_cut_short, received, time_limit
 from tactile_bayes.record.table import Source, Table, table_of
 from tactile_bayes.tasks import write_atomically
 
@@ -45,10 +38,8 @@ def write_netcdf(
 ) -> None:
     """Write a dataset or a tree to a NetCDF 4 file atomically, with checksums.
 
-    Arrays of numbers and characters have Fletcher-32 checksums, which every program that uses HDF5 verifies. In HDF5,
-    attributes, scalars, strings of different lengths and the structure of the file cannot have them. Therefore the last
-    line of the file, beyond the end that HDF5 knows, is the SHA-256 of all bytes before it; `read_netcdf` verifies it.
-    Programs that modify the file drop that line.
+    Arrays have those of HDF5. Attributes, scalars and the structure of a file cannot; so the last line, beyond the end
+    that HDF5 knows, is the SHA-256 of all bytes before it. Programs that modify the file drop that line.
     """
     image = _image_of(content, encoding or {})
     with write_atomically(path) as temporary, open(temporary, "wb") as file:
@@ -87,12 +78,10 @@ def read_netcdf(
     sha256: str | None = None,
     **options: Any,
 ) -> Content:
-    """Read a NetCDF 4 file of this or another program into memory, by `xarray.open_dataset` or `open_datatree`.
+    """Read a NetCDF 4 file into memory, by `xarray.open_dataset` or `open_datatree`, or raise `refused(what)`.
 
-    A file that ends with its SHA-256 is verified first, or with the one that is stated elsewhere, since damage may
-    cause HDF5 to crash, to hang, or to take all memory. A file of another program, or an earlier version, is read by a
-    process of its own, with a limit of time and memory, which takes half a second longer. One that is damaged, no
-    NetCDF 4 file, or leads to other files raises what `refused` makes of a description of the fault.
+    Damage may cause HDF5 to crash, to hang, or to take all memory. So a file is verified first if its SHA-256 is known,
+    and else read by a process of its own, with a limit of time and memory, which takes half a second longer.
     """
     content = path.read_bytes()
     if sha256 is not None:
@@ -117,8 +106,7 @@ def _dataset(group: FileGroup, options: Mapping[str, Any]) -> xr.Dataset:
 def _content_elsewhere(content: bytes, with_groups: bool) -> dict[str, FileGroup]:
     """Return what `content_of` returns, or raise what it raises, from a process with limits of time and memory.
 
-    The process runs a script, not a function of multiprocessing: it then needs no `__main__` that can be imported, and
-    a worker, which may have no processes of multiprocessing, can start it.
+    It runs a script: unlike multiprocessing, that needs no `__main__` to import, and a worker may start it.
     """
     if is_cut_short(content):
         raise ValueError("it is no HDF5, or has fewer bytes than it states")
@@ -128,10 +116,9 @@ def _content_elsewhere(content: bytes, with_groups: bool) -> dict[str, FileGroup
     command = [sys.executable, "-P", "-W", "ignore", netcdf_content.__file__, *(["groups"] if with_groups else [])]
     paths = os.pathsep.join(path for path in sys.path if path)
     environment = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
+    options: dict[str, Any] = {"input": content, "capture_output": True, "timeout": patience, "env": environment}
     try:
-        process = subprocess.run(
-            command, input=content, capture_output=True, timeout=patience, env=environment, check=False
-        )
+        process = subprocess.run(command, check=False, **options)
     except subprocess.TimeoutExpired:
         raise ValueError(f"HDF5 takes more than {patience} s over it") from None
     answer = io.BytesIO(process.stdout)
@@ -181,10 +168,7 @@ def _seal(sha256: str) -> bytes:
 
 
 def read_netcdf_table(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read a table as it is in the file, with all columns.
-
-    The dimension of the samples may have any name if all columns share it.
-    """
+    """Read a table as it is in the file; the dimension of its samples may have any name."""
     source = Source(str(path))
     record = read_netcdf(
         path,

@@ -10,8 +10,9 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from itertools import islice
 from types import SimpleNamespace
 from typing import Any, BinaryIO, NamedTuple
 
@@ -42,7 +43,7 @@ class FileGroup(NamedTuple):
     """A group of a file."""
 
     # Dimensions, values as stored, and attributes, by name.
-    variables: Mapping[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, Any]]]
+    variables: Mapping[str, tuple[Sequence[str], NDArray[Any], Mapping[str, Any]]]
     attrs: Mapping[str, Any]
 
 
@@ -59,15 +60,11 @@ def content_of(content: bytes, with_groups: bool) -> dict[str, FileGroup]:
     with h5py.File(io.BytesIO(content), "r") as hdf5:
         refuse_unsafe(hdf5, len(content))
     with h5netcdf.File(io.BytesIO(content), "r", decode_vlen_strings=True, phony_dims="access") as file:
-        return dict(_groups("/", file)) if with_groups else {"/": _group(file)}
+        return dict(islice(_groups("/", file), None if with_groups else 1))
 
 
 def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
-    """Refuse a file that leads to other files or to programs, or states more than its bytes can hold.
-
-    It has no links but that of each object to its group, no variables outside of it or made of others, no types but
-    numbers and text, no filters of plugins, and no sizes that do not fit the file.
-    """
+    """Refuse a file that leads to other files or to programs, or states more than its bytes can hold."""
     known, total, waiting = {_address(hdf5)}, 0, [(hdf5, 0)]
     _refuse_attributes(hdf5, size)
     while waiting:
@@ -148,17 +145,10 @@ def _refuse_attributes(part: h5py.HLObject, size: int) -> None:
 
 
 def _groups(path: str, group: h5netcdf.Group) -> Iterator[tuple[str, FileGroup]]:
-    yield path, _group(group)
+    variables = {name: (of.dimensions, _plain(of[...]), _attributes(of)) for name, of in group.variables.items()}
+    yield path, FileGroup(variables, _attributes(group))
     for name, part in group.groups.items():
         yield from _groups(f"{path.rstrip('/')}/{name}", part)
-
-
-def _group(group: h5netcdf.Group) -> FileGroup:
-    variables = {
-        name: (variable.dimensions, _plain(variable[...]), _attributes(variable))
-        for name, variable in group.variables.items()
-    }
-    return FileGroup(variables, _attributes(group))
 
 
 def _plain(values: Any) -> NDArray[Any]:
@@ -183,16 +173,7 @@ def _attributes(of: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
 def send(groups: Mapping[str, FileGroup], write: Callable[[bytes], object]) -> None:
     """Write groups as arrays of numbers, one after the other; the first is a table of everything, as JSON."""
     arrays: list[NDArray[Any]] = []
-    table = {
-        path: {
-            "attrs": _all_packed(group.attrs, arrays),
-            "variables": {
-                name: [dims, _packed(values, arrays), _all_packed(attrs, arrays)]
-                for name, (dims, values, attrs) in group.variables.items()
-            },
-        }
-        for path, group in groups.items()
-    }
+    table = _packed(groups, arrays)
     file: Any = SimpleNamespace(write=write)  # an actual file is asked for its position, which a pipe has not
     index = json.dumps([len(arrays), table]).encode()
     for array in (np.frombuffer(index, dtype=np.uint8), *arrays):
@@ -203,16 +184,7 @@ def received(file: BinaryIO) -> dict[str, FileGroup]:
     """Return the groups that `send` has written."""
     count, table = json.loads(np.load(file, allow_pickle=False).tobytes())
     arrays = [np.load(file, allow_pickle=False) for _ in range(count)]
-    return {
-        path: FileGroup(
-            {
-                name: (tuple(dims), _unpacked(values, arrays), _all_unpacked(attrs, arrays))
-                for name, (dims, values, attrs) in group["variables"].items()
-            },
-            _all_unpacked(group["attrs"], arrays),
-        )
-        for path, group in table.items()
-    }
+    return {path: FileGroup(*group) for path, group in _unpacked(table, arrays).items()}
 
 
 def _packed(value: Any, arrays: list[NDArray[Any]]) -> list[Any]:
@@ -221,17 +193,15 @@ def _packed(value: Any, arrays: list[NDArray[Any]]) -> list[Any]:
         return ["text", value]
     if isinstance(value, bytes) and not isinstance(value, np.generic):
         return ["bytes", value.decode("latin-1")]
-    if isinstance(value, list):
+    if isinstance(value, Mapping):
+        return ["table", {name: _packed(part, arrays) for name, part in value.items()}]
+    if isinstance(value, list | tuple):
         return ["list", [_packed(part, arrays) for part in value]]
     array = np.asarray(value)
     if array.dtype.kind == "O":
         return ["objects", [_packed(part, arrays) for part in array.flat], array.shape]
     arrays.append(_plain(array))
     return ["array" if isinstance(value, np.ndarray) else "number", len(arrays) - 1]
-
-
-def _all_packed(values: Mapping[str, Any], arrays: list[NDArray[Any]]) -> dict[str, list[Any]]:
-    return {name: _packed(value, arrays) for name, value in values.items()}
 
 
 def _unpacked(packed: list[Any], arrays: list[NDArray[Any]]) -> Any:
@@ -241,6 +211,8 @@ def _unpacked(packed: list[Any], arrays: list[NDArray[Any]]) -> Any:
             return value
         case "bytes":
             return value.encode("latin-1")
+        case "table":
+            return {name: _unpacked(part, arrays) for name, part in value.items()}
         case "list":
             return [_unpacked(part, arrays) for part in value]
         case "objects":
@@ -251,19 +223,11 @@ def _unpacked(packed: list[Any], arrays: list[NDArray[Any]]) -> Any:
             return arrays[value] if kind == "array" else arrays[value][()]
 
 
-def _all_unpacked(packed: Mapping[str, list[Any]], arrays: list[NDArray[Any]]) -> dict[str, Any]:
-    return {name: _unpacked(value, arrays) for name, value in packed.items()}
-
-
 # ---- the script
 
 
 def time_limit(size: int) -> tuple[int, int]:
-    """Return the time of the processor, and the whole time, in which a file of this size is read [s].
-
-    The whole time is longer, since other work may take most of the processor; it holds where the system has no limit
-    of the other.
-    """
+    """Return the time of the processor, and the whole time, longer as there is other work, to read a file [s]."""
     seconds = _SECONDS + size // _RATE
     return seconds, _PATIENCE * seconds
 
@@ -276,19 +240,13 @@ def _limit(size: int) -> None:
         return
     used = resource.getrusage(resource.RUSAGE_SELF)
     seconds = math.ceil(used.ru_utime + used.ru_stime) + time_limit(size)[0]
-    _lower(resource.RLIMIT_CPU, seconds)
-    _lower(resource.RLIMIT_CORE, 0)
+    limits = {resource.RLIMIT_CPU: seconds, resource.RLIMIT_CORE: 0}
     with suppress(OSError), open("/proc/self/statm", encoding="ascii") as statm:  # Linux
         mapped = int(statm.read().split()[0]) * resource.getpagesize()
-        _lower(resource.RLIMIT_AS, mapped + 2 * size + largest_content(size) + _WORKSPACE)
-
-
-def _lower(limit: int, value: int) -> None:
-    import resource
-
-    _, highest = resource.getrlimit(limit)
-    value = value if highest == resource.RLIM_INFINITY else min(value, highest)
-    resource.setrlimit(limit, (value, highest))
+        limits[resource.RLIMIT_AS] = mapped + 2 * size + largest_content(size) + _WORKSPACE
+    for limit, value in limits.items():
+        _, highest = resource.getrlimit(limit)
+        resource.setrlimit(limit, (value if highest == resource.RLIM_INFINITY else min(value, highest), highest))
 
 
 def _main() -> None:

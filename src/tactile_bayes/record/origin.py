@@ -15,7 +15,14 @@ import xarray as xr
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, converted, unit_of, units_disagree
+from tactile_bayes.record.quantity import (
+    OTHER_UNITS,
+    accepted_units,
+    converted,
+    same_quantity,
+    unit_of,
+    units_disagree,
+)
 from tactile_bayes.record.schema import DIRECTIONS, MEASURED, Column, Kind, column_of
 from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
@@ -24,7 +31,8 @@ from tactile_bayes.record.table import Cells, Source, Table
 # Name of the origin of a column as text: an attribute of tables and results, and an encoding of a record, which is not
 # written with it.
 ORIGIN = "origin_in_file"
-CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")  # columns for which a single value can be given
+# Columns for which a single value can be given, with an example.
+CONSTANTS = {"sweep": "0", "direction": "forward", "base_x": "12[mm]", "base_y": "12[mm]", "drive_angle": "90[deg]"}
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _LEAD = re.compile(rf"(?:(?P<offset>[+-]?{_NUMBER})\s*)?(?P<sign>[+-])\s*+(?P<rest>.+)")
 _FACTOR = re.compile(rf"(?P<factor>{_NUMBER})\s*\*\s*+(?P<rest>.+)")
@@ -38,13 +46,10 @@ _UNIT_IN_NAME = re.compile(
 
 @dataclass(frozen=True)
 class Origin:
-    """Origin of a column of a record: offset + sign · factor · (a column of the file), or one value for all samples.
-
-    `unit` is that of column (times factor) and offset, if it is given with the column or in its name.
-    """
+    """Origin of a column of a record: offset + sign · factor · (a column of the file), or one value for all samples."""
 
     column: str | None
-    unit: str | None = None
+    unit: str | None = None  # of column (times factor) and offset, if it is given with the column or in its name
     sign: int = 1
     offset: float = 0.0
     value: str | float | None = None
@@ -66,16 +71,15 @@ class Origin:
 def column_entry(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, digits: int = 3) -> str:
     """Return the source that reads a column of a record as sense · (its values) + added, rounded to digits.
 
-    A column that was not read from a file has the same name and unit there. "" if its origin does not have the unit of
-    the record, as after a conversion by the rod.
+    "" if its origin does not have the unit of the record, as after a conversion by the rod.
     """
     name, unit = str(column.name), str(column.attrs.get("units", "1"))
     stored = column.encoding.get(ORIGIN) or column.attrs.get(ORIGIN)
     origin = Origin(**json.loads(stored)) if stored else Origin(name, unit)
-    of_file, of_record = unit_of(origin.unit or unit), unit_of(unit)
-    if of_file is None or of_record is None or of_file.dimension != of_record.dimension or origin.column is None:
+    pair = same_quantity(unit, origin.unit or unit)
+    if pair is None or origin.column is None:
         return ""
-    number = float(converted(added, of_record, of_file))
+    number = float(converted(added, *pair))
     if number:
         number = round(number, digits - 1 - math.floor(math.log10(abs(number))))
     read = replace(origin, sign=sense * origin.sign, offset=sense * origin.offset + number)
@@ -91,10 +95,7 @@ def with_origin(column: xr.DataArray) -> xr.DataArray:
 
 
 def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source) -> dict[str, Origin]:
-    """Find the origins of the columns of a record that have other names in a file, by their columns there.
-
-    Columns like "force_x [mN]" need no entry. What cannot be parsed, or is not in the file, is refused.
-    """
+    """Find the origins of columns of a record that have other names in a file, also of those like "force_x [mN]"."""
     names = list(names)
     origins = {target: _origin(target, str(text), names, source) for target, text in columns.items()}
     for name in names:
@@ -104,9 +105,8 @@ def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source)
     used = {origin.column for origin in origins.values()}
     for target in origins:
         if target in names and target not in used:
-            raise source.column_error(
-                target, f"is in the file, but {columns.get(target)!r} is given for it: leave out the one that is wrong"
-            )
+            what = f"is in the file, but {columns.get(target)!r} is given for it: leave out the one that is wrong"
+            raise source.column_error(target, what)
     return origins
 
 
@@ -129,10 +129,7 @@ def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str
 
 
 def renamed(table: Table, columns: Mapping[str, str]) -> Table:
-    """Return the table with the names, signs and zeros of a record; units are stated but not converted.
-
-    A further column with a slash in its name is renamed, if there is no column of the new name.
-    """
+    """Return the table with the names, signs and zeros of a record, and its units as stated."""
     origins = origins_of(columns, table.columns, table.source)
     used = Counter(origin.column for origin in origins.values())
     further = [name for name in table.columns if name not in used]
@@ -183,17 +180,12 @@ def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: S
     if origin.offset:
         values += origin.offset
     stated = attrs.get("units")
-    if stated in (None, "unknown"):
-        unit = origin.unit
-    else:
-        unit = str(stated)
-        if origin.unit is not None and units_disagree(origin.unit, unit):
-            what = (
-                f"is in [{unit}], but [{origin.unit}] is given for it, or in its name: leave out the one that is wrong"
-            )
-            if unit_of(origin.unit) is None:
-                what += f"; if [{origin.unit}] is no unit, give {f'{origin.column}[{unit}]'!r} for {target!r}"
-            raise source.column_error(target, what)
+    unit = origin.unit if stated in (None, "unknown") else str(stated)
+    if unit is not None and origin.unit is not None and units_disagree(origin.unit, unit):
+        what = f"is in [{unit}], but [{origin.unit}] is given for it, or in its name: leave out the one that is wrong"
+        if unit_of(origin.unit) is None:
+            what += f"; if [{origin.unit}] is no unit, give {f'{origin.column}[{unit}]'!r} for {target!r}"
+        raise source.column_error(target, what)
     attrs = {name: value for name, value in attrs.items() if name != "units"}
     return values, attrs if unit is None else {"units": unit, **attrs}
 
@@ -218,41 +210,32 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
     if target in names:
         hint = f"the file has a column {target!r} already: leave this entry of [file] out for it"
     elif target in CONSTANTS:
-        hint += f" (or one value for all samples, like {_example(column)})"
-    raise source.error(
-        f"there is no column {wanted!r}{look_alikes(wanted)}, which is given for {target!r} (columns: "
-        f"{', '.join(names)}): {hint}"
-    )
+        hint += f" (or one value for all samples, like {CONSTANTS[target]})"
+    what = f"there is no column {wanted!r}{look_alikes(wanted)}, which is given for {target!r}"
+    raise source.error(f"{what} (columns: {', '.join(names)}): {hint}")
 
 
 def _readings(text: str) -> Iterator[Origin]:
     """Yield possible meanings of a text, the most literal first: names may contain signs, digits and brackets."""
-    starts = [("", 1, text)]
+    starts = [(0.0, 1, text)]
     if match := _LEAD.fullmatch(text):
-        starts.append((match["offset"] or "", -1 if match["sign"] == "-" else 1, match["rest"]))
+        starts.append((float(match["offset"] or 0), -1 if match["sign"] == "-" else 1, match["rest"]))
     for lead, sign, rest in starts:
-        for factor, named in _with_and_without_factor(rest):
+        match = _FACTOR.fullmatch(rest)
+        scaled = [(float(match["factor"]), match["rest"])] if match else []
+        for factor, named in [(1.0, rest), *scaled]:
             for trail, name in _with_and_without_trail(named):
-                offset = float(lead or 0) + float(trail or 0)
-                yield Origin(name, None, sign, offset, factor=factor)
+                yield Origin(name, None, sign, lead + trail, factor=factor)
                 if match := _BRACKETS.fullmatch(name):
-                    unit = match["unit"].strip()
                     for shift, stem in _with_and_without_trail(match["rest"]):
-                        yield Origin(stem, unit, sign, offset + float(shift or 0), factor=factor)
+                        yield Origin(stem, match["unit"].strip(), sign, lead + trail + shift, factor=factor)
 
 
-def _with_and_without_factor(text: str) -> Iterator[tuple[float, str]]:
-    """Yield the text as it is, and what a number with an asterisk multiplies."""
-    yield 1.0, text
-    if match := _FACTOR.fullmatch(text):
-        yield float(match["factor"]), match["rest"]
-
-
-def _with_and_without_trail(text: str) -> Iterator[tuple[str, str]]:
+def _with_and_without_trail(text: str) -> Iterator[tuple[float, str]]:
     """Yield the text as a name, and a name with a number that is added to it."""
-    yield "", text
+    yield 0.0, text
     if match := _TRAIL.fullmatch(text):
-        yield match["sign"] + match["offset"], match["rest"]
+        yield float(match["sign"] + match["offset"]), match["rest"]
 
 
 def found_column(text: str, names: list[str]) -> str | None:
@@ -271,18 +254,14 @@ def _compact(text: str) -> str:
 
 
 def _checked(target: str, column: Column, origin: Origin, is_whole: bool, text: str, source: Source) -> Origin:
-    """Complete an origin by the unit in the column's name, or refuse a contradiction.
-
-    Brackets that are no unit may be part of a name that is given as a whole.
-    """
+    """Complete an origin by the unit in the column's name, or refuse a contradiction."""
+    given = f"columns: {text!r} is given for {target!r}"
     if column.kind != "number":
         if origin.unit is not None or origin.sign < 0 or origin.offset or origin.factor != 1.0:
-            raise ParameterError(
-                f"columns: {text!r} is given for {target!r}, which has no unit, factor, sign or zero: give a name alone"
-            )
+            raise ParameterError(f"{given}, which has no unit, factor, sign or zero: give a name alone")
         return origin
     if not 0.0 < origin.factor < math.inf:
-        raise ParameterError(f"columns: {text!r} is given for {target!r}: give a factor above zero, like 1e-3*Fx[N]")
+        raise ParameterError(f"{given}: give a factor above zero, like 1e-3*Fx[N]")
     assert origin.column is not None
     _, in_name = stem_and_unit(origin.column)
     if in_name is None:
@@ -290,26 +269,19 @@ def _checked(target: str, column: Column, origin: Origin, is_whole: bool, text: 
     if origin.unit is None:
         return replace(origin, unit=in_name)
     if unit_of(origin.unit) is None:
-        raise ParameterError(
-            f"columns: {text!r} is given for {target!r}, but {origin.unit!r} is no unit of it: it takes "
-            f"{accepted_units(column.unit)}"
-        )
-    if in_name is None or (is_whole and unit_of(in_name) is None):
-        return origin
-    if units_disagree(origin.unit, in_name):
-        raise source.error(
-            f"column {origin.column!r} is in [{in_name}] by its name, but [{origin.unit}] is given for it: leave out "
-            "the one that is wrong"
-        )
+        accepted = accepted_units(column.unit)
+        raise ParameterError(f"{given}, but {origin.unit!r} is no unit of it: it takes {accepted}")
+    is_of_name = is_whole and in_name is not None and unit_of(in_name) is None  # brackets without a unit
+    if in_name is not None and not is_of_name and units_disagree(origin.unit, in_name):
+        what = f"column {origin.column!r} is in [{in_name}] by its name, but [{origin.unit}] is given for it"
+        raise source.error(f"{what}: leave out the one that is wrong")
     return origin
 
 
 def _ending(name: str, column: Column) -> str | None:
     """Return a unit of the column's quantity at the end of a name, as in Fx_mN."""
     ending = name.rpartition("_")[2]
-    unit, expected = unit_of(ending), unit_of(column.unit)
-    is_unit = unit is not None and expected is not None and unit.dimension == expected.dimension
-    return ending if is_unit and ending != name else None
+    return ending if ending != name and same_quantity(ending, column.unit) else None
 
 
 def stem_and_unit(name: str) -> tuple[str, str | None]:
@@ -330,17 +302,11 @@ def _value(target: str, text: str) -> Origin | None:
     if match is None:
         return None
     if target not in CONSTANTS:
-        raise ParameterError(
-            f"columns: {text!r} is given for {target!r}, which is measured: name a column of the file, or declare a "
-            "channel missing"
-        )
+        what = f"columns: {text!r} is given for {target!r}, which is measured"
+        raise ParameterError(f"{what}: name a column of the file, or declare a channel missing")
     if target == "sweep":
         return Origin(None, value=int(text)) if re.fullmatch(r"[+-]?[0-9]+", text) else None
     return Origin(None, unit=match["unit"], value=float(match["number"]))
-
-
-def _example(column: Column) -> str:
-    return {"direction": "forward", "sweep": "0", "drive_angle": "90[deg]"}.get(column.name, "12[mm]")
 
 
 def _column(name: str) -> Column:

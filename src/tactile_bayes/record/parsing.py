@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,11 @@ from tactile_bayes.record.storable import LONGEST_CELL, not_storable
 from tactile_bayes.record.table import Source
 
 FREE = 1 << 26  # bytes that a column of text may always take
+_PARSERS: Mapping[Kind, tuple[Callable[[Any], Any], str]] = {
+    "integer": (integer_in, "an integer"),
+    "number": (number_in, "a number"),
+    "text": (lambda cell: cell if isinstance(cell, str) else None, "text"),
+}
 
 
 def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[Any]:
@@ -44,12 +49,11 @@ def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[An
     if kind == "text" and values.dtype.kind == "U":
         _refuse_text(name, values, source)
         return values
-    parse: Callable[[Any], Any] = {"integer": integer_in, "number": number_in, "text": _text}[kind]
+    parse, what = _PARSERS[kind]
     cells = values.tolist()
     parsed = [parse(cell) for cell in cells]
     if None in parsed:
         bad = parsed.index(None)
-        what = {"integer": "an integer", "number": "a number", "text": "text"}[kind]
         raise source.cell_error(bad, name, f"{cells[bad]!r} is not {what}: correct it, or remove the row")
     if kind == "text":
         _refuse_text(name, values, source)
@@ -68,16 +72,8 @@ def _refuse_text(name: str, values: NDArray[Any], source: Source) -> None:
             raise source.cell_error(values.tolist().index(text), name, f"the text {reason}: correct it, or shorten it")
 
 
-def _text(cell: Any) -> str | None:
-    return cell if isinstance(cell, str) else None
-
-
 def text_array(texts: Sequence[str]) -> NDArray[Any]:
-    """Return texts as an array of NumPy strings, or of str objects.
-
-    NumPy gives every cell the width of the longest one, four bytes a character. If that is much, and less than half of
-    it would be used, the cells are objects, with one object for equal texts.
-    """
+    """Return texts as an array of NumPy strings, or of objects if strings, as wide as the longest, take much more."""
     width = max(map(len, texts), default=0)
     if 4 * width * len(texts) > FREE and width * len(texts) > 2 * (sum(map(len, texts)) + len(texts)):
         seen: dict[str, str] = {}

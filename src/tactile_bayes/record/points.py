@@ -18,7 +18,7 @@ from tactile_bayes.record.csv_header import column_described
 from tactile_bayes.record.dxf import curves_in
 from tactile_bayes.record.encoding import not_utf8
 from tactile_bayes.record.origin import stem_and_unit
-from tactile_bayes.record.quantity import accepted_units, unit_of
+from tactile_bayes.record.quantity import accepted_units, same_quantity
 
 _CALLED = {"m": "a unit of length", "1": "rod lengths"}
 
@@ -26,8 +26,7 @@ _CALLED = {"m": "a unit of length", "1": "rod lengths"}
 class Points(NamedTuple):
     """Points of a file."""
 
-    # Shape (n, 2) each, or (n, 3) with a column beside x and y, in their order, in metres if a unit is stated.
-    pieces: list[Floats]
+    pieces: list[Floats]  # shape (n, 2) each, or (n, 3) with a column beside x and y, in metres if a unit is stated
     unit: str  # "m", "1" for rod lengths, or "" if the file states none
 
     def in_unit(self, unit: str, name: str) -> list[Floats]:
@@ -72,9 +71,8 @@ def read_points(path: str | os.PathLike[str], *, beside: str = "") -> Points:
         raise ParameterError(f"{path}: {not_utf8(error)}") from error
     described = dict(filter(None, map(column_described, lines)))
     wanted = ("x", "y", beside) if beside else ("x", "y")
-    names, rows = _table_of(
-        [line for line in lines if line.strip() and not line.lstrip().startswith("#")], path, wanted
-    )
+    rows_of_file = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    names, rows = _table_of(rows_of_file, path, wanted)
     scales = [_scale(described.get(name) or stem_and_unit(name)[1] or "", path) for name in names]
     if len({unit for _, unit in scales}) > 1:
         raise ParameterError(f"{path}: {', '.join(map(repr, names))} state different units: write x [mm],y [mm]")
@@ -92,11 +90,9 @@ def columns_in(path: Path, names: Sequence[str], what: str) -> list[Floats]:
     for name in names:
         values = [number_in(row.get(name) or "") for row in rows]
         if not values or None in values:
-            at = values.index(None) + 1 if values else 0
-            raise ParameterError(
-                f"{path}: {what} {at} has no number in column {name!r}: write a line '{','.join(names)}', then a "
-                f"{what} in each line, with decimal points"
-            )
+            wrong = f"{what} {values.index(None) + 1 if values else 0} has no number in column {name!r}"
+            way = f"write a line '{','.join(names)}', then a {what} in each line, with decimal points"
+            raise ParameterError(f"{path}: {wrong}: {way}")
         columns.append(np.array(values, dtype=float))
     return columns
 
@@ -105,20 +101,17 @@ def _scale(unit: str, path: object) -> tuple[float, str]:
     """Return the size of a unit of length, and the unit of what is multiplied by it."""
     if unit in ("", "1", "L"):
         return 1.0, "1" if unit else ""
-    found, metre = unit_of(unit), unit_of("m")
-    if found is None or metre is None or found.dimension != metre.dimension:
+    pair = same_quantity(unit, "m")
+    if pair is None:
         raise ParameterError(f"{path}: points are in [{unit}]: give {accepted_units('m')}, or L for rod lengths")
-    return float(found.scale), "m"
+    return float(pair[0].scale), "m"
 
 
 def _table_of(lines: Sequence[str], path: object, wanted: Sequence[str]) -> tuple[list[str], Floats]:
     """Return the names of the wanted columns that there are, and their numbers; the first line may hold names."""
-    sample = "".join(lines[:2])
-    delimiter = next((mark for mark in ";\t," if mark in sample), " ")
-    rows = [
-        [cell.strip() for cell in row]
-        for row in csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
-    ]
+    delimiter = next((mark for mark in ";\t," if mark in "".join(lines[:2])), " ")
+    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
+    rows = [[cell.strip() for cell in row] for row in reader]
     names, places = ["x", "y"], [0, 1]
     if rows and _point(rows[0], places, delimiter) is None:
         stems = [stem_and_unit(name)[0].lower() for name in rows[0]]

@@ -8,7 +8,6 @@ from tactile_bayes.arrays import Floats, Index
 
 _APART = 1.5  # least ratio of the smallest step between positions to the largest difference of readings at one position
 _FEWEST_STEPS = 3
-
 _MOST_POSITIONS = 2.0 / 3.0  # largest number of steps between positions, over the number of all steps
 # Largest net motion at positions over the way between them; share of their differences that it may make up; and largest
 # sum of these differences, over the way between positions, for which it may make up more.

@@ -14,22 +14,23 @@ import numpy as np
 
 from tactile_bayes.record.spelling import plain
 
-Dimension = tuple[int, int, int, int]  # powers of length, force, time and angle
-_PREFIXES = {
-    "": Fraction(1),
-    "da": Fraction(10),
-    "G": Fraction(10**9),
-    "M": Fraction(10**6),
-    "k": Fraction(10**3),
-    "h": Fraction(10**2),
-    "d": Fraction(1, 10),
-    "c": Fraction(1, 10**2),
-    "m": Fraction(1, 10**3),
-    "u": Fraction(1, 10**6),
-    "μ": Fraction(1, 10**6),
-    "n": Fraction(1, 10**9),
-    "p": Fraction(1, 10**12),
+Dimension = tuple[int, ...]  # powers of length, force, time and angle
+_POWERS = {
+    "": 0,
+    "da": 1,
+    "h": 2,
+    "k": 3,
+    "M": 6,
+    "G": 9,
+    "d": -1,
+    "c": -2,
+    "m": -3,
+    "u": -6,
+    "μ": -6,
+    "n": -9,
+    "p": -12,
 }
+_PREFIXES = {prefix: Fraction(10) ** power for prefix, power in _POWERS.items()}
 _DEGREE = Fraction(math.pi) / 180
 _BASES: dict[str, tuple[Dimension, Fraction]] = {
     "m": ((1, 0, 0, 0), Fraction(1)),
@@ -38,22 +39,16 @@ _BASES: dict[str, tuple[Dimension, Fraction]] = {
     "Pa": ((-2, 1, 0, 0), Fraction(1)),
     "s": ((0, 0, 1, 0), Fraction(1)),
     "rad": ((0, 0, 0, 1), Fraction(1)),
-    "deg": ((0, 0, 0, 1), _DEGREE),
-    "°": ((0, 0, 0, 1), _DEGREE),
+    **dict.fromkeys(("deg", "°"), ((0, 0, 0, 1), _DEGREE)),
 }
 _WORDS = {
-    "": "1",
-    "-": "1",
-    "deg.": "deg",
-    "degree": "deg",
-    "degrees": "deg",
-    "radian": "rad",
-    "radians": "rad",
-    "metre": "m",
-    "meter": "m",
+    **dict.fromkeys(("", "-"), "1"),
+    **dict.fromkeys(("deg.", "degree", "degrees"), "deg"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("metre", "meter"), "m"),
     "newton": "N",
 }
-_COMMON = {
+_COMMON: dict[Dimension, tuple[str, ...]] = {
     (1, 0, 0, 0): ("m", "cm", "mm", "µm"),
     (0, 1, 0, 0): ("N", "kN", "mN", "µN", "gf"),
     (1, 1, 0, 0): ("N m", "N mm", "mN m", "µN m", "mN mm"),
@@ -62,16 +57,13 @@ _COMMON = {
     (-1, 0, 0, 0): ("1/m", "1/cm", "1/mm"),
     (0, 0, 0, 1): ("rad", "mrad", "deg", "°"),
 }
-_LONGEST = 100
-_LARGEST = 10**100  # largest number of characters of a unit, and its largest size in SI
+_LONGEST, _LARGEST = 100, 10**100  # largest number of characters of a unit, and its largest size in SI
 # Units that are often stated with a column, and are none of its quantity, or not known here.
-OTHER_UNITS = frozenset(
-    (
-        *("kg", "mg", "lb", "lbs", "lbf", "kgf", "kp", "oz", "ozf", "dyn", "dyne", "inch", "inches", "ft"),
-        *("mV", "µV", "kV", "mA", "Pa", "kPa", "MPa", "hPa", "bar", "mbar", "psi", "°C", "°F", "Hz", "kHz"),
-        *("count", "counts", "digits", "LSB", "turns", "rev", "%", "gon", "grad"),
-    )
-)
+OTHER_UNITS = {
+    *("kg", "mg", "lb", "lbs", "lbf", "kgf", "kp", "oz", "ozf", "dyn", "dyne", "inch", "inches", "ft"),
+    *("mV", "µV", "kV", "mA", "Pa", "kPa", "MPa", "hPa", "bar", "mbar", "psi", "°C", "°F", "Hz", "kHz"),
+    *("count", "counts", "digits", "LSB", "turns", "rev", "%", "gon", "grad"),
+}
 _SYMBOL = re.compile(
     rf"(?P<prefix>{'|'.join(sorted(_PREFIXES, key=len, reverse=True))})"
     rf"(?P<base>{'|'.join(sorted(_BASES, key=len, reverse=True))})"
@@ -95,17 +87,16 @@ class Unit:
 
 @functools.cache
 def unit_of(text: str) -> Unit | None:
-    """Parse a unit, or return None.
+    """Parse a unit, or return None. N m², N·m^2, N*m2, N-m² and Nm² are the same one.
 
-    It is made of metres, newtons, gram-forces, seconds, radians and degrees, with prefixes from p to G, products and
-    powers. N m², N·m^2, N*m2, N-m² and Nm² are the same unit. Without a separator a prefix has precedence over a
-    product: mN is a millinewton, and m N a newton metre.
+    Without a separator a prefix has precedence over a product: mN is a millinewton, and m N a newton metre.
     """
     if len(text) > _LONGEST:
         return None
     text = unicodedata.normalize("NFKC", plain(text)).strip()
     text = _WORDS.get(text.lower(), text)
-    scale, dimension = Fraction(1), (0, 0, 0, 0)
+    scale = Fraction(1)
+    dimension: Dimension = (0, 0, 0, 0)
     for index, part in enumerate(text.split("/")):
         sense = -1 if index else 1
         for piece in _SEPARATOR.split(part.strip()):
@@ -114,11 +105,14 @@ def unit_of(text: str) -> Unit | None:
                 return None
             for factor in factors:
                 scale *= factor.scale**sense
-                length, force, time, angle = (
-                    sum(pair) for pair in zip(dimension, (sense * power for power in factor.dimension), strict=True)
-                )
-                dimension = (length, force, time, angle)
+                dimension = tuple(a + sense * b for a, b in zip(dimension, factor.dimension, strict=True))
     return Unit(scale, dimension) if max(scale, 1 / scale) < _LARGEST else None
+
+
+def same_quantity(one: str, other: str) -> tuple[Unit, Unit] | None:
+    """Return two units if they are known, and of the same quantity."""
+    first, second = unit_of(one), unit_of(other)
+    return None if first is None or second is None or first.dimension != second.dimension else (first, second)
 
 
 def units_disagree(one: str, other: str) -> bool:
@@ -140,8 +134,7 @@ def _factors(piece: str) -> tuple[Unit, ...] | None:
         if dimension[3] and _PREFIXES[match["prefix"]] > 1:  # Grad is a degree or a gon, and nobody's gigaradian
             return None
         power = int(match["power"] or 1)
-        length, force, time, angle = (power * one for one in dimension)
-        factors.append(Unit((_PREFIXES[match["prefix"]] * scale) ** power, (length, force, time, angle)))
+        factors.append(Unit((_PREFIXES[match["prefix"]] * scale) ** power, tuple(power * one for one in dimension)))
         piece = piece[match.end() :]
     return tuple(factors) or None
 

@@ -22,18 +22,14 @@ LARGEST_DRIVE_ANGLE = 2.0 * math.pi + 0.5
 
 @dataclass(frozen=True)
 class Column:
-    """Meaning of a column of a record, with its unit in an SI record, "1" for pure numbers and text.
-
-    `scale` is the property of `Rod` that converts a dimensionless value to SI by multiplication, None if both are
-    equal, and `turning_name` the description for a load cell that turns with the drive, if it differs.
-    """
+    """Meaning of a column of a record."""
 
     name: str
     kind: Kind
-    unit: str
-    scale: Scale | None
+    unit: str  # in an SI record, "1" for pure numbers and text
+    scale: Scale | None  # property of `Rod` by which a dimensionless value is multiplied in SI, if it is
     long_name: str
-    turning_name: str | None = None
+    turning_name: str | None = None  # description for a load cell that turns with the drive, if it differs
 
     def unit_in(self, units: str) -> str:
         """Return the unit of the column in a record of the given units, "SI" or "dimensionless"."""

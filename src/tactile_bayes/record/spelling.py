@@ -52,10 +52,7 @@ def refuse_unknown_keys(
 
 
 def plain(text: str) -> str:
-    """Replace characters by those that they look like and stand for; those without a width are removed.
-
-    These are minus signs, degrees, dots, quotation marks, blanks, full-width characters, and digits of any script.
-    """
+    """Replace characters by those that they look like and stand for; those without a width are removed."""
     return text if text.isascii() else "".join(map(_meant, text))
 
 
@@ -96,9 +93,7 @@ def _meant(sign: str) -> str:
 
 
 def is_misspelling(name: str, meant: str) -> bool:
-    """Return whether a name differs from another one in at most a letter, or one in eight: left out, added, other,
-    or exchanged with its neighbour.
-    """
+    """Return whether a name differs from another in a letter, or one in eight: left out, added, other, or exchanged."""
     most = max(1, len(meant) // 8)
     return abs(len(name) - len(meant)) <= most and _edits(name, meant) <= most
 

@@ -8,9 +8,8 @@ from typing import Any
 LONGEST_CELL = 131_072  # largest number of characters in a cell, that of Python's CSV reader
 _LONGEST_NAME = 200  # largest number of bytes of a name; NetCDF limits it, and names derived from it, to 256
 # Attributes that NetCDF and HDF5 reserve.
-_RESERVED = frozenset(
-    ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict")
-) | {"_NCProperties"}
+_RESERVED = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"}
+_RESERVED |= {"_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict", "_NCProperties"}
 _NOT_STORABLE = re.compile("[\0\ud800-\udfff]")
 _WITH_UNIT = re.compile(r"(?P<stem>[^/]*\S)\s+/\s+(?P<unit>\S.*)")
 
@@ -35,8 +34,7 @@ def is_storable_attribute(name: Any) -> bool:
 
 def not_storable(text: str) -> str | None:
     """Return the reason why not every file can store a text, None if there is none."""
-    match = _NOT_STORABLE.search(text)
-    if match is None:
+    if (match := _NOT_STORABLE.search(text)) is None:
         return None
     return "has a NUL character (0x00) in it" if match[0] == "\0" else "has half of a surrogate pair in it"
 

@@ -25,18 +25,13 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
     """
     direction, angle = values["direction"], values["drive_angle"]
     forward = direction == "forward"
-    impossible = ~(forward | (direction == "backward"))
-    if impossible.any():
-        sample = int(np.argmax(impossible))
-        raise source.cell_error(
-            np.flatnonzero(impossible),
-            "direction",
-            f"{str(direction[sample])!r} is no direction: write 'forward' or 'backward'",
-        )
-    beyond = (angle > LARGEST_DRIVE_ANGLE) | (angle < -LARGEST_DRIVE_ANGLE)
-    if beyond.any():
-        what = _beyond_a_turn(angle, int(np.argmax(beyond)), source)
-        raise source.cell_error(np.flatnonzero(beyond), "drive_angle", what)
+    impossible = np.flatnonzero(~(forward | (direction == "backward")))
+    if impossible.size:
+        what = f"{str(direction[impossible[0]])!r} is no direction: write 'forward' or 'backward'"
+        raise source.cell_error(impossible, "direction", what)
+    beyond = np.flatnonzero(np.abs(angle) > LARGEST_DRIVE_ANGLE)
+    if beyond.size:
+        raise source.cell_error(beyond, "drive_angle", _beyond_a_turn(angle, beyond[0], source))
     plain = _are_plain(values, forward)
     for rows in _sweeps(values["sweep"]):
         first, last = _ends(rows)
@@ -44,26 +39,23 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
             continue
         sweep = int(values["sweep"][first])
         carried = _is_carried(values["base_x"][rows], values["base_y"][rows], angle[rows])
-        for name, column, part in (
-            ("direction", forward, "motion of the drive"),
-            ("base_x", values["base_x"], "position of the pivot"),
-            ("base_y", values["base_y"], "position of the pivot"),
-        ):
-            differs = column[rows] != column[first]
-            if differs.any() and not (carried and column is not forward):
+        for name in ("direction",) if carried else ("direction", "base_x", "base_y"):
+            differs = values[name][rows] != values[name][first]
+            if differs.any():
                 other = first + int(np.argmax(differs)) if isinstance(rows, slice) else int(rows[np.argmax(differs)])
                 one, two = values[name][first].item(), values[name][other].item()
+                part = "motion of the drive" if name == "direction" else "position of the pivot"
                 raise source.error(
                     f"sweep {sweep} mixes two values of {name!r}, {one!r} ({source.row(first)}) and {two!r} "
                     f"({source.row(other)}): give each {part} a sweep number of its own"
                 )
         sense = 1 if forward[first] else -1
         if not carried and _runs_backwards(angle[rows], sense):
+            one, two = (f"{float(angle[at])!r} rad ({source.row(at)})" for at in (first, last))
             raise source.error(
                 f"sweep {sweep} is labelled {DIRECTIONS[sense < 0]!r}, but its drive angle "
-                f"{'decreases' if sense > 0 else 'increases'}, from {float(angle[first])!r} rad ({source.row(first)}) "
-                f"to {float(angle[last])!r} rad ({source.row(last)}): label it {DIRECTIONS[sense > 0]!r}, or put its "
-                "samples in the order in which they were measured"
+                f"{'decreases' if sense > 0 else 'increases'}, from {one} to {two}: label it {DIRECTIONS[sense > 0]!r},"
+                " or put its samples in the order in which they were measured"
             )
 
 
@@ -80,10 +72,8 @@ def _beyond_a_turn(angle: Floats, sample: int, source: Source) -> str:
     unit = unit_of(stated) if stated else None
     if unit is not None and unit.scale != 1:
         return _counted_on(angle, sample, stated, float(unit.scale), source)
-    what = (
-        f"{float(angle[sample])!r} is more than a turn (2π), so the angles look like degrees: convert the column "
-        "to radians, with numpy.radians or times 0.017453292519943295"
-    )
+    what = f"{float(angle[sample])!r} is more than a turn (2π), so the angles look like degrees: convert the column to "
+    what += "radians, with numpy.radians or times 0.017453292519943295"
     if unit is not None:
         return f"{what}; or, as it is stated in [{stated}], {_counted_on(angle, sample, stated, 1.0, source)}"
     if not source.name:
@@ -138,8 +128,7 @@ def base_of_sample(record: xr.Dataset) -> tuple[list[tuple[float, float]], Index
 def travels_of(record: xr.Dataset) -> Floats:
     """Return how far along the drive of its sweep each sample is, shape (samples,).
 
-    That is the drive angle in rotations [rad], and where the base is carried, the distance that it has moved since the
-    first sample of the sweep [length].
+    That is the drive angle [rad], or where the base is carried, its way since the first sample of the sweep [length].
     """
     travels, sweep = record.drive_angle.values.astype(float), record.sweep.values
     for number in carried_sweeps(record):

@@ -7,7 +7,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.record.parsing import parsed_column
@@ -42,35 +41,37 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
     """Add sweeps and directions to a table, from its drive angle, or from the motion of its base; see `FileFormat`.
 
     If the base moves in more than half of the steps, the drive carries it. A sweep then ends where the base turns back
-    on the line along which it moves most, and it is forward if the rod's left side leads: if the middle of the unloaded
-    rod, of this length [length], moves to its left on average. In a record of both kinds each stretch in which the base
-    rests while the drive turns, or is carried, is split in its own way.
+    on the line along which it moves most, and it is forward if the middle of the unloaded rod, of this length [length],
+    moves to its left on average. In a record of both kinds each stretch is split in its own way.
     """
     source = table.source
     table.refuse_empty()
     for name in ("sweep", "direction"):
         if name in table.columns:
             raise source.column_error(name, "is there already: do without split_sweeps, or remove the column")
-    if "drive_angle" not in table.columns:  # refused later, with the others that are missing
-        return _with_sweeps(table, np.zeros(table.samples, dtype=np.int64), np.full(table.samples, "forward"))
-    angle = _finite("drive_angle", table)
-    base = np.zeros((angle.size, 2))
-    for column, name in enumerate(("base_x", "base_y")):
-        if name in table.columns:
-            base[:, column] = _finite(name, table)
+    sweeps = [(0, table.samples, True)]
+    if "drive_angle" in table.columns:  # else refused later, with the others that are missing
+        angle = _finite("drive_angle", table)
+        at_origin = np.zeros(angle.size)
+        base = [_finite(name, table) if name in table.columns else at_origin for name in ("base_x", "base_y")]
+        sweeps = _sweeps_in(angle, np.stack(base, axis=1), length, source)
+    sizes = [end - begin for begin, end, _ in sweeps]
+    sweep = np.repeat(np.arange(len(sweeps)), sizes)
+    direction = np.where(np.repeat([is_forward for *_, is_forward in sweeps], sizes), "forward", "backward")
+    return replace(table, columns={**table.columns, "sweep": (sweep, {}), "direction": (direction, {})})
+
+
+def _sweeps_in(angle: Floats, base: Floats, length: float, source: Source) -> list[tuple[int, int, bool]]:
+    """Return begin and end of each sweep, and whether it is forward."""
     moved = np.append(False, np.any(base[1:] != base[:-1], axis=1))
     _refuse_wrapped(angle, moved, source)
-    sweep, direction = np.zeros(angle.size, dtype=np.int64), np.empty(angle.size, dtype="U8")
     sweeps: list[tuple[int, int, bool]] = []
     for stretch, is_carried in _stretches(angle, moved):
-        if not is_carried:
-            sweeps += _turned_sweeps(stretch, angle, moved, source)
-        else:
+        if is_carried:
             sweeps += _carried_sweeps(stretch, angle, base, length, source)
-    for number, (begin, end, is_forward) in enumerate(sweeps):
-        sweep[begin:end] = number
-        direction[begin:end] = "forward" if is_forward else "backward"
-    return _with_sweeps(table, sweep, direction)
+        else:
+            sweeps += _turned_sweeps(stretch, angle, moved, source)
+    return sweeps
 
 
 def each_row(table: Table) -> Table:
@@ -91,16 +92,10 @@ def _finite(name: str, table: Table) -> Floats:
     return values
 
 
-def _with_sweeps(table: Table, sweep: NDArray[np.int64], direction: NDArray[np.str_]) -> Table:
-    """Return a table with sweeps and directions."""
-    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, table.source)
-
-
 def _stretches(angle: Floats, moved: Flags) -> list[tuple[slice, bool]]:
     """Return stretches of samples in their order, each with whether the base is carried in it.
 
-    A base that rests while the drive turns is a pivot. Where there are such stretches and others, of more than a few
-    samples, the record is of both kinds. `moved` is True for samples at which the base is not where it was before.
+    A base that rests while the drive turns is a pivot. `moved` is True where the base is not where it was before.
     """
     turns = np.zeros(angle.size, dtype=bool)
     for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):
@@ -131,14 +126,10 @@ def _turned_sweeps(stretch: slice, angle: Floats, moved: Flags, source: Source) 
     for begin, end in pairwise([*starts, stretch.stop]):
         slope = trend(angle[begin:end])
         if slope == 0.0:
-            if end - begin == 1:
-                what = "there is one sample" if angle.size == 1 else "a sweep has one sample"
-                what += f", {source.row(begin)}, so that it has no direction: give more samples"
-            else:
-                what = (
-                    f"the drive angle does not move from {source.row(begin)} to {source.row(end - 1)}, so that the "
-                    "sweep has no direction: remove these samples"
-                )
+            what = f"a sweep has one sample, {source.row(begin)}, and so no direction: give more samples"
+            if end - begin > 1:
+                what = f"the drive angle does not move from {source.row(begin)} to {source.row(end - 1)}, so that the "
+                what += "sweep has no direction: remove these samples"
             raise source.error(f"{what}, or give columns 'sweep' and 'direction'")
         sweeps.append((begin, end, slope > 0.0))
     return sweeps
@@ -157,10 +148,9 @@ def _carried_sweeps(
         step, middle = np.diff(base[begin:end], axis=0), 0.5 * (angle[begin : end - 1] + angle[begin + 1 : end])
         left = -np.sin(middle) * step[:, 0] + np.cos(middle) * step[:, 1] + 0.5 * length * np.diff(angle[begin:end])
         if not abs(left.sum()) > _ROUNDING * np.abs(step).sum():
-            raise source.error(
-                f"from {source.row(begin)} to {source.row(end - 1)} the base moves along the rod, or not at all, so "
-                "that no side of the rod leads and the sweep has no direction: give columns 'sweep' and 'direction'"
-            )
+            what = f"from {source.row(begin)} to {source.row(end - 1)} the base moves along the rod, or not at all, so "
+            what += "that no side of the rod leads and the sweep has no direction: give columns 'sweep' and 'direction'"
+            raise source.error(what)
         sweeps.append((begin, end, left.sum() > 0.0))
     return sweeps
 
@@ -172,11 +162,7 @@ def _starts(turns: list[int]) -> list[int]:
 
 
 def _refuse_wrapped(angle: Floats, moved: Flags, source: Source) -> None:
-    """Refuse an angle that jumps by about a turn between two samples.
-
-    It is an angle modulo a turn, or a drive that was reset after a sweep of a whole turn, which begins a new sweep.
-    Only the user knows which, so that the angle is not unwrapped here.
-    """
+    """Refuse an angle that jumps by about a turn: only the user knows whether it wraps, or the drive was reset."""
     if np.abs(angle).max() > LARGEST_DRIVE_ANGLE:  # probably degrees, which are refused later
         return
     step = np.diff(angle)

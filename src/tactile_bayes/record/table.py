@@ -37,12 +37,15 @@ class Source:
         """Return the name of a sample in messages."""
         return f"sample {sample}" if self.lines is None else f"line {self.lines[sample]}"
 
-    def error(self, what: str) -> RecordError:
-        """Make an error about the table."""
+    def error(self, what: str, samples: Index | slice | None = None) -> RecordError:
+        """Make an error about the table, or about samples, whose lines it then has."""
         if len(what) > _LONGEST:  # quoted content may be of any length; the correction is at the end
             what = f"{what[: _LONGEST // 2]} … {what[-_LONGEST // 2 :]}"
         what = what.replace("\0", "\\0")  # terminals and logs show none
-        return RecordError(f"{self.name}: {what}" if self.name else what)
+        error = RecordError(f"{self.name}: {what}" if self.name else what)
+        if samples is not None and self.lines is not None:
+            error.lines = tuple(np.asarray(self.lines)[samples].tolist())
+        return error
 
     def line_error(self, line: int, what: str) -> RecordError:
         """Make an error with a line of the file."""
@@ -57,18 +60,7 @@ class Source:
     def cell_error(self, samples: int | Index, column: str, what: str) -> RecordError:
         """Make an error with a cell, the first of those in which the same is wrong."""
         every = np.atleast_1d(samples)
-        error = self.error(f"{self.row(int(every[0]))}, {self.column(column)}: {what}")
-        return self._with_lines(error, every)
-
-    def rows_error(self, what: str) -> RecordError:
-        """Make an error with all rows."""
-        return self._with_lines(self.error(what), None)
-
-    def _with_lines(self, error: RecordError, samples: Index | None) -> RecordError:
-        if self.lines is not None:
-            lines = np.asarray(self.lines)
-            error.lines = tuple((lines if samples is None else lines[samples]).tolist())
-        return error
+        return self.error(f"{self.row(int(every[0]))}, {self.column(column)}: {what}", every)
 
     def column_error(self, column: str, what: str) -> RecordError:
         """Make an error with the description of a column."""
@@ -110,9 +102,7 @@ def table_of(dataset: xr.Dataset, source: Source, dimension: Hashable = "sample"
     """Return the table in a dataset, if all its variables have the dimension of the samples only."""
     for name, variable in dataset.variables.items():
         if variable.dims != (dimension,):
-            raise source.error(
-                f"variable {str(name)!r} has dimensions {variable.dims}: a column of a record has the one dimension "
-                "'sample'; drop the variable, or stack it"
-            )
+            what = f"variable {str(name)!r} has dimensions {variable.dims}: a column of a record has the one dimension "
+            raise source.error(f"{what}'sample'; drop the variable, or stack it")
     columns = {str(name): (np.asarray(variable.values), variable.attrs) for name, variable in dataset.variables.items()}
     return Table(columns, dataset.attrs, source)

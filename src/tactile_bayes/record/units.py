@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod, without_rod
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.quantity import accepted_units, converted, unit_of
+from tactile_bayes.record.quantity import accepted_units, converted, same_quantity
 from tactile_bayes.record.rig_entry import rig_entry
 from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED, UNITS, column_of
 from tactile_bayes.record.table import Cells, Source, Table
@@ -28,10 +28,7 @@ def rod_of(record: xr.Dataset) -> Rod:
 
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
-    """Replace the rod that a record states, by default by itself, without a change of its values.
-
-    A rod without a length gives the shape of that of an SI record; a dimensionless record takes no other.
-    """
+    """Replace the rod that a record states; one without a length gives the shape of that of an SI record."""
     check_optional("the rod", rod, Rod)
     if rod is None:
         return record
@@ -46,10 +43,9 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
 
 
 def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
-    """Convert a record to the units of its rod, unless it is in them: lengths L, moments EI/L, forces EI/L².
+    """Convert a record and its load cell to the units of the rod: lengths L, moments EI/L, forces EI/L².
 
-    Equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945. The data sheet of the load cell is converted with
-    the columns. Columns that the schema does not know are kept as they are.
+    Equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945. Columns that the schema does not know are kept.
     """
     if record.attrs.get("units") == "dimensionless":
         return record
@@ -94,10 +90,9 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
 
 
 def in_units_of_record(table: Table, rod: Rod | None) -> Table:
-    """Convert every column that the schema knows to the unit of the record, or refuse its unit.
+    """Convert every column that the schema knows, arrays of float64 in place, to the unit of the record, or refuse it.
 
-    The attribute `units`, or else the rod, determines whether the record is SI or dimensionless; without both, a column
-    with a unit like newtons or millimetres makes it SI. Arrays of float64 are converted in place.
+    The record is SI or dimensionless by its attribute `units`, else by the rod, else by units like newtons.
     """
     attrs: dict[str, Any] = dict(table.attrs)
     if "units" not in attrs and rod is None and any(_is_physical(*item) for item in table.columns.items()):
@@ -115,28 +110,20 @@ def in_units_of_record(table: Table, rod: Rod | None) -> Table:
             columns[name] = (values, of_column)
             continue
         expected = column.unit_in(units)
-        stated, wanted = unit_of(str(of_column["units"])), unit_of(expected)
-        if stated is None or wanted is None or stated.dimension != wanted.dimension:
-            what = f"is in [{of_column['units']}], but "
+        pair = same_quantity(str(of_column["units"]), expected)
+        if pair is None:
+            what = f"takes {accepted_units(expected)}: correct the unit, or convert the column"
             if units == "dimensionless" and column.scale is not None:
-                what += (
-                    f"the record is dimensionless, so that it takes [{expected}]: convert it, or state units 'SI' and "
-                    "the rod"
-                )
-            else:
-                what += f"takes {accepted_units(expected)}: correct the unit, or convert the column"
-            raise table.source.column_error(name, what)
-        if stated != wanted:
-            values = converted(parsed_column(name, values, table.source), stated, wanted)
+                what = f"takes [{expected}] in a dimensionless record: convert it, or state units 'SI' and the rod"
+            raise table.source.column_error(name, f"is in [{of_column['units']}], but {what}")
+        if pair[0] != pair[1]:
+            values = converted(parsed_column(name, values, table.source), *pair)
         columns[name] = (values, {**of_column, "units": expected})
     return Table(columns, attrs, source)
 
 
 def assumed_units(table: Table) -> str:
-    """Return a note on the measured columns of an SI record whose unit nobody states; "" if there are none.
-
-    The table has units of a record, see `in_units_of_record`.
-    """
+    """Return a note on the measured columns of an SI record whose unit nobody states; "" if there are none."""
     if "units" in table.source.stated or (not table.source.stated and "units" in table.attrs):
         return ""
     taken = {
@@ -160,5 +147,4 @@ def _is_physical(name: str, cells: Cells) -> bool:
     column = column_of(name)
     if column is None or column.scale is None or "units" not in cells[1]:
         return False
-    unit, expected = unit_of(str(cells[1]["units"])), unit_of(column.unit)
-    return unit is not None and expected is not None and unit.dimension == expected.dimension
+    return same_quantity(str(cells[1]["units"]), column.unit) is not None

@@ -65,15 +65,10 @@ def _refuse_names(names: Collection[Any], source: Source, is_allowed: Callable[[
     for name in names:
         if is_allowed(name):
             continue
-        what = f"the name {name!r} cannot be stored in every file"
+        way = ": use printable characters, at most 200 bytes, no '/', not '.' alone, and no name that NetCDF reserves"
         if isinstance(name, str) and name in source.names and is_storable(storable(name)):
-            what += f", and as {storable(name)!r} there is another column: rename one of the two"
-        else:
-            what += (
-                ": use printable characters, at most 200 bytes of them, no '/', not '.' alone, and no name that NetCDF "
-                "keeps for itself"
-            )
-        raise source.error(what)
+            way = f", and as {storable(name)!r} there is another column: rename one of the two"
+        raise source.error(f"the name {name!r} cannot be stored in every file{way}")
 
 
 def _checked_column_attributes(
@@ -89,10 +84,8 @@ def _checked_column_attributes(
     expected = column.unit_in(units)
     stated = str(attrs.get("units", expected))
     if units_disagree(stated, expected):
-        raise source.error(
-            f"column {name!r} is in [{stated}], but the record is {units}: convert the column to [{expected}], or "
-            "state the units that the record is in, and for SI the rod"
-        )
+        what = f"column {name!r} is in [{stated}], but the record is {units}: convert the column to [{expected}], or "
+        raise source.error(f"{what}state the units that the record is in, and for SI the rod")
     long_name = column.long_name_in(stated_frame(of_record, source))
     own_words = [column.long_name_in(frame) for frame in FRAMES]  # descriptions for another frame are replaced
     kept = {key: value for key, value in attrs.items() if not (key == "long_name" and value in own_words)}
@@ -101,7 +94,6 @@ def _checked_column_attributes(
 
 def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
     unknown = [name for name in columns if column_of(name) is None]
-    is_file = bool(source.name)
     for name in MEASURED:
         if name in columns:
             continue
@@ -115,7 +107,7 @@ def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
             what = f"there is no column {name!r} (columns: {', '.join(source.names or columns) or 'none'}): add it"
         else:
             continue
-        if is_file:
+        if source.name:
             what += f", or say what stands for it, {file_entry(name, stands)}"
         if name in CHANNELS:
             what += f", or declare the channel missing, with an empty column, {file_entry('missing', [name])}"
@@ -129,9 +121,8 @@ def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
 def _refuse_gaps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
     missing = [name for name in CHANNELS if np.isnan(values[name]).all()]
     if len(missing) == len(CHANNELS):
-        raise source.rows_error(
-            f"every load channel is empty: a record needs measurements of at least one of {', '.join(CHANNELS)}"
-        )
+        what = f"every load channel is empty: a record needs measurements of at least one of {', '.join(CHANNELS)}"
+        raise source.error(what, slice(None))
     for name in MEASURED:
         if COLUMNS[name].kind != "number" or name in missing:
             continue
