@@ -39,8 +39,6 @@ class Flat:
         return 1.0
 
 
-# --- What is refused ------------------------------------------------------------------------------------------------
-
 WITHOUT_DENSITY = [
     (stats.norm(0.5, 0.0), "no width.*give the number, 0.5"),
     (stats.uniform(loc=0.0, scale=0), "no width.*give the number, 0"),
@@ -60,20 +58,10 @@ WITHOUT_DENSITY = [
     (Flat(0.5, -np.inf), "finite draws"),
 ]
 STATING_NOTHING = [
-    {"normal": [0.1]},
-    {"normal": [0.1, -1.0]},
-    {"normal": [0.1, 0.0]},
-    {"normal": 0.1},
-    {"half_normal": [0.1, 0.2]},
-    {"gauss": [0.0, 1.0]},
-    {"norm": {"mean": 0.1}},
-    {"beta": {"a": 1.0}},
-    {"normal": [0.0, 1.0], "uniform": [0.0, 1.0]},
-    {"kstest": {}},
-    "wide",
-    [0.1, 0.2],
-    NAN,
-    True,
+    *({"normal": numbers} for numbers in ([0.1], [0.1, -1.0], [0.1, 0.0], 0.1)),
+    *({"half_normal": [0.1, 0.2]}, {"normal": [0.0, 1.0], "uniform": [0.0, 1.0]}),
+    *({"gauss": [0.0, 1.0]}, {"norm": {"mean": 0.1}}, {"beta": {"a": 1.0}}, {"kstest": {}}),
+    *("wide", [0.1, 0.2], NAN, True),
 ]
 HISTOGRAM = stats.rv_histogram((np.ones(4), np.linspace(0.3, 0.7, 5)))()
 NO_WIDTH = stats.norm(0.5, 0.0)
@@ -97,24 +85,14 @@ def test_what_is_no_distribution_is_refused_by_its_parameter(call, words):
         call()
 
 
-# --- Densities ------------------------------------------------------------------------------------------------------
-
 COMMON = [
-    stats.norm(),
-    stats.norm(0.3, 2.0),
-    stats.norm(loc=-1.0, scale=1e-6),
-    stats.halfnorm(scale=0.3),
-    stats.halfnorm(0.1, 0.5),
-    stats.lognorm(s=0.4, scale=0.7),
-    stats.lognorm(0.4, 0.2, 3.0),
-    stats.uniform(-1.0, 2.5),
-    stats.uniform(loc=0.3),
+    *(stats.norm(), stats.norm(0.3, 2.0), stats.norm(loc=-1.0, scale=1e-6)),
+    *(stats.halfnorm(scale=0.3), stats.halfnorm(0.1, 0.5), stats.uniform(-1.0, 2.5), stats.uniform(loc=0.3)),
+    *(stats.lognorm(s=0.4, scale=0.7), stats.lognorm(0.4, 0.2, 3.0)),
 ]
 OTHERS = [
-    stats.loguniform(1e-6, 10.0),
-    stats.t(df=3, scale=0.2),
-    stats.truncnorm(-1, 1),
-    stats.truncnorm(-1.0, np.inf, 0.1, 0.2),
+    *(stats.loguniform(1e-6, 10.0), stats.t(df=3, scale=0.2)),
+    *(stats.truncnorm(-1, 1), stats.truncnorm(-1.0, np.inf, 0.1, 0.2)),
 ]
 
 
@@ -174,9 +152,6 @@ def test_newer_distributions_of_scipy_are_taken(newer, same):
     assert found.std() == pytest.approx(same.std())
 
 
-# --- Numbers and tables ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("one", "other", "words"),
     [
@@ -190,17 +165,12 @@ def test_numbers_and_words_do_not_depend_on_how_they_are_given(one, other, words
     assert numbers_of(one) == numbers_of(other)
     assert list(numbers_of(one))[-2:] == ["loc", "scale"]
     assert in_words(one) == in_words(other) == (words or in_words(one))
-
-
-def test_what_is_no_distribution_of_scipy_has_no_numbers():
     assert numbers_of(Flat(0.5, 0.0)) == {}
 
 
 def test_a_log_normal_by_position_is_widened_like_one_by_name():
-    by_position, by_name = (
-        widened({"a": prior}, 2.0)["a"]
-        for prior in (stats.lognorm(0.6, 0.1, 0.9), stats.lognorm(0.6, loc=0.1, scale=0.9))
-    )
+    priors = stats.lognorm(0.6, 0.1, 0.9), stats.lognorm(0.6, loc=0.1, scale=0.9)
+    by_position, by_name = (widened({"a": prior}, 2.0)["a"] for prior in priors)
     assert by_position.std() == by_name.std()
     assert by_position.median() == pytest.approx(1.0)
     assert numbers_of(by_position)["s"] == 1.2

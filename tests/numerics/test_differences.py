@@ -20,12 +20,16 @@ def test_slopes_of_a_quadratic_form_are_exact():
     np.testing.assert_allclose(found, right, rtol=0.0, atol=1e-9)
 
 
-def test_of_a_cubic_the_square_of_the_step_is_left():
-    def values(points):
-        return points**3
-
-    for step in (1e-2, 2e-2):
-        assert central_slopes(values, np.array([2.0]), step)[0, 0] == pytest.approx(12.0 + step**2, rel=1e-12)
+@pytest.mark.parametrize(
+    ("values", "at", "step", "slope"),
+    [
+        (lambda x: x**3, 2.0, 1e-2, 12.0 + 1e-4),  # the square of the step is left
+        (lambda x: 1e4 * x + 1e3 * x**2, 1.0, 1e-2, 1.2e4),  # a steep slope is no jump
+        (lambda x: 400.0 * np.abs(x) + 100.0 * x, 0.0, 1e-5, 100.0),  # nor is a bend of 0.004: the mean of both sides
+    ],
+)
+def test_slopes_of_a_number(values, at, step, slope):
+    assert central_slopes(values, np.array([at]), step)[0, 0] == pytest.approx(slope, rel=1e-9)
 
 
 def test_every_parameter_has_a_step_of_its_own():
@@ -54,19 +58,3 @@ def test_a_jump_is_no_slope(side, height):
 
     found = central_slopes(values, np.array([1.0, 0.0]), 1e-5)
     np.testing.assert_allclose(found, [[0.0, 3.0], [7.0, 3.0]], atol=1e-8)
-
-
-def test_a_steep_slope_is_no_jump():
-    def values(points):
-        return 1e4 * points + 1e3 * points**2
-
-    assert central_slopes(values, np.array([1.0]), 1e-2)[0, 0] == pytest.approx(1.2e4, rel=1e-12)
-
-
-def test_a_bend_that_is_small_beside_the_noise_is_kept():
-    """A corner of 0.004 standard deviations: the mean of the slopes on both sides."""
-
-    def values(points):
-        return 400.0 * np.abs(points)
-
-    assert central_slopes(lambda p: values(p) + 100.0 * p, np.array([0.0]), 1e-5)[0, 0] == pytest.approx(100.0)

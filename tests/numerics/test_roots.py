@@ -56,9 +56,8 @@ def test_a_flat_root_and_an_infinite_slope():
         with np.errstate(divide="ignore"):
             return -np.cbrt(x), -1 / (3 * np.cbrt(x) ** 2)
 
-    for function in (cube, root):
-        found = falling_root(function, np.array([-1.0]), np.array([0.7]))
-        assert abs(found[0]) < 1e-4 if function is cube else abs(found[0]) <= 2e-14
+    for function, most in ((cube, 1e-4), (root, 2e-14)):
+        assert abs(falling_root(function, np.array([-1.0]), np.array([0.7]))[0]) <= most
 
 
 def test_bracket_of_no_width_nothing_and_inputs_left_alone():

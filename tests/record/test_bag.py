@@ -133,6 +133,11 @@ TWO_PUBLISHERS = sorted(drive() + FINGER, key=lambda told: told.time)
 OTHER_ORDER = [t._replace(joints=dict(sorted(t.joints.items()))) if t.time > 0.2 else t for t in drive()]
 
 
+LATE = [told._replace(received=told.time + (0.025 if number % 3 else 0.0)) for number, told in enumerate(drive())]
+ONE_UNSTAMPED = [Told(None, {"wrist": 9.0, "elbow": 0.7}, -0.04), *drive(times=ALL[15:])]
+WITH_NAN = drive(lambda t: np.nan if 0.095 < t < 0.115 or 0.195 < t < 0.285 else angle(t))
+
+
 def stamped(stamp):
     """The drive with other times in its headers, received when it is read."""
     return [Told(stamp(told.time), told.joints, told.time) for told in drive()]
@@ -147,25 +152,10 @@ def stamped(stamp):
         pytest.param(stamped(lambda t: t - (5.0 if t < 0.2 else 5.2)), RECEIVED, TIMES, id="a clock that is set back"),
         pytest.param(stamped(lambda time: time + 1e6), RECEIVED, TIMES, id="another clock"),
         pytest.param(stamped(np.floor), RECEIVED, TIMES, id="whole seconds"),
-        pytest.param(
-            [told._replace(received=told.time + (0.025 if number % 3 else 0.0)) for number, told in enumerate(drive())],
-            CELL,
-            TIMES,
-            id="out of order",
-        ),
+        pytest.param(LATE, CELL, TIMES, id="out of order"),
         pytest.param(drive(), [told for told in CELL for _ in range(2)], TIMES, id="each twice"),
-        pytest.param(
-            [Told(None, {"wrist": 9.0, "elbow": 0.7}, -0.04), *drive(times=ALL[15:])],
-            CELL,
-            TIMES[10:],
-            id="one without a stamp",
-        ),
-        pytest.param(
-            drive(lambda t: np.nan if 0.095 < t < 0.115 or 0.195 < t < 0.285 else angle(t)),
-            CELL,
-            TIMES[(TIMES < 0.195) | (TIMES > 0.285)],
-            id="not a number",
-        ),
+        pytest.param(ONE_UNSTAMPED, CELL, TIMES[10:], id="one without a stamp"),
+        pytest.param(WITH_NAN, CELL, TIMES[(TIMES < 0.195) | (TIMES > 0.285)], id="not a number"),
     ],
 )
 def test_angles_are_those_of_the_times_of_loads(tmp_path, joints, cell, times):

@@ -1,7 +1,5 @@
 """Records of a base that is carried: files of a stage, sweeps and directions from its motion, and travels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -16,6 +14,8 @@ CIRCLE = tb.contours.Circle(0.3, 0.8)
 THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
 BACK = tb.Translation(base=(-0.8, 0.0), heading=0.0, drive_angle=1.2, travel=1.6)
 SHORT = tb.Translation(base=(0.6, 0.0), heading=np.pi, drive_angle=1.2, travel=1.2)
+MOTION = tb.Motion(x=[0.8, -0.8], y=0.0, drive_angle=[0.9, 1.7])
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 ROD = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
 
 
@@ -46,13 +46,7 @@ def test_a_clamped_rod_states_its_angle_once(staged, head, columns):
 
 
 @pytest.mark.parametrize(
-    "drive",
-    [
-        [THERE],
-        [BACK],
-        [tb.Motion(x=[0.8, -0.8], y=0.0, drive_angle=[0.9, 1.7])],
-        [THERE, tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.2, 1.6)],
-    ],
+    "drive", [[THERE], [BACK], [MOTION], [THERE, tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.2, 1.6)]]
 )
 def test_sweeps_and_directions_follow_from_the_motion(staged, drive):
     """A column of angles precedes an angle in the header."""
@@ -78,7 +72,7 @@ def test_lengths_of_a_stage_are_in_metres(staged):
         [tb.Rotation(), THERE],
         [SHORT, tb.Rotation((-0.6, 0.0)), tb.Rotation((0.2, 0.0))],
         [tb.Rotation((0.6, 0.0)), SHORT, BACK, tb.Rotation()],
-        [tb.Rotation(), tb.Motion(x=[0.8, -0.8], y=0.0, drive_angle=[0.9, 1.7]), tb.Rotation((0.1, -0.1))],
+        [tb.Rotation(), MOTION, tb.Rotation((0.1, -0.1))],
     ],
     ids=["beside", "from-its-end", "from-its-begin", "a-motion-between"],
 )
@@ -113,21 +107,19 @@ def test_travels_are_ways_where_the_base_is_carried():
 
 def test_unloaded_stretches_end_at_travels():
     scan = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE])
-    found = zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, rng=1))
+    found = zero_load(CELL.measure(scan.record, rng=1))
     for number in (0, 2):
         before, after = found["snap_off_travel"].sel(sweep=number).values
         assert before <= scan.sweeps[number].snap_off.travel <= after
-    turned = tb.scan(CIRCLE).record
-    assert "onset_travel" not in zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(turned, rng=1))
+    assert "onset_travel" not in zero_load(CELL.measure(tb.scan(CIRCLE).record, rng=1))
 
 
 def test_an_inspection_reports_travels_and_finds_lost_samples():
-    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.scan(CIRCLE, drive=BACK).record, rng=1)
+    measured = CELL.measure(tb.scan(CIRCLE, drive=BACK).record, rng=1)
     found = tb.inspect_record(measured)
     sweeps = found.sweeps.isel(sweep=0)
     assert bool(sweeps.carried)
-    assert float(sweeps.travel) == pytest.approx(1.6)
-    assert float(sweeps.travel_step) == pytest.approx(0.01)
+    assert [float(sweeps.travel), float(sweeps.travel_step)] == pytest.approx([1.6, 0.01])
     assert not found.samples.uneven_step.values.any()
     lost = tb.inspect_record(measured.isel(sample=np.delete(np.arange(161), [30, 31])))
     assert np.flatnonzero(lost.samples.uneven_step.values).tolist() == [30]

@@ -12,12 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record import csv_rows, parsing
-from tactile_bayes.record.cell import integer_in, number_in
 from tactile_bayes.record.csv_format import read_csv
+from tactile_bayes.record.parsing import integer_in, number_in
 from tactile_bayes.rig import read_record
 
 TESTS = Path(__file__).parents[1]
-NAMES = ["sweep", "direction", "drive_angle", "force_x", "note", "count"]
 USUAL = {
     "sweep": ["0", "1"],
     "direction": ["forward", "backward"],
@@ -39,9 +38,9 @@ def tables(draw):
     delimiter = draw(st.sampled_from(",,;\t"))
     comma = delimiter != "," and draw(st.booleans())
     is_odd = st.sampled_from([False] * 29 + [True]) if draw(st.booleans()) else st.just(False)
-    lines = [delimiter.join(NAMES)]
+    lines = [delimiter.join(USUAL)]
     for _ in range(draw(st.integers(1, 25))):
-        cells = [draw(st.sampled_from(ODD if draw(is_odd) else USUAL[name])) for name in NAMES]
+        cells = [draw(st.sampled_from(ODD if draw(is_odd) else usual)) for usual in USUAL.values()]
         if comma:
             cells[2:4] = (cell.replace(".", ",") for cell in cells[2:4])
         if draw(is_odd):

@@ -30,14 +30,6 @@ ANGLES = np.array(columns()["drive_angle"])
 moderate = st.floats(-1e6, 1e6)
 
 
-@pytest.fixture(scope="module")
-def scanned():
-    return tb.scan(paper_profile("II", q=0.5)).record
-
-
-# --- Turning ----------------------------------------------------------------------------------------------------
-
-
 def test_a_force_along_the_rod_is_axial_and_one_to_its_left_is_transversal():
     along = make_record(columns(force_x=2.0 * np.cos(ANGLES), force_y=2.0 * np.sin(ANGLES)))
     turning = in_frame(along, "turning")
@@ -147,11 +139,7 @@ HUGE = np.where(np.arange(6) == 5, 1.7e308, 0.0)
         ),
         (columns(truth_force_y=np.ones(6)), "fixed", ["sample 0", "a truth_force_y", "no truth_force_x", "turning"]),
         (columns(truth_force_x=np.ones(6), truth_force_y=GAP), "fixed", ["sample 2", "a truth_force_x"]),
-        (
-            columns(force_x=HUGE, force_y=HUGE, drive_angle=ANGLES - 1.0),
-            "fixed",
-            ["sample 5, column 'force_x'", "inf"],
-        ),
+        (columns(force_x=HUGE, force_y=HUGE, drive_angle=ANGLES - 1.0), "fixed", ["sample 5, column 'force_x'", "inf"]),
     ],
 )
 def test_what_cannot_be_turned_is_refused_and_returned_in_its_own_frame(table, frame, named):
@@ -159,9 +147,6 @@ def test_what_cannot_be_turned_is_refused_and_returned_in_its_own_frame(table, f
     assert in_frame(record, frame) is record
     with refused(RecordError, *named):
         in_frame(record, next(other for other in FRAMES if other != frame))
-
-
-# --- The attribute ----------------------------------------------------------------------------------------------
 
 
 def test_a_record_may_be_said_to_turn(tmp_path):
@@ -195,24 +180,10 @@ def test_a_frame_that_is_none_is_refused(frame):
             use(record)
 
 
-def test_frames_that_contradict_or_do_not_exist_are_refused(scanned):
+def test_frames_that_contradict_or_do_not_exist_are_refused():
     with refused(RecordError, "load_cell_frame 'fixed'", "'turning'"):
         make_record(columns(), Rig(load_cell=LoadCell(frame="turning")), attrs={"load_cell_frame": "fixed"})
     with refused(ParameterError, frame="world"):
-        in_frame(scanned, "world")
+        in_frame(make_record(columns()), "world")
     with refused(RecordError, "xarray.Dataset", "dict"):
         in_frame({}, "turning")
-
-
-# --- Files ------------------------------------------------------------------------------------------------------
-
-
-def test_a_csv_file_states_the_frame_in_its_header(tmp_path):
-    path = tmp_path / "lab.csv"
-    write_record(make_record(columns(), Rig(load_cell=LoadCell(frame="turning"))), path)
-    lines = path.read_text(encoding="utf-8").splitlines()
-    assert "# load_cell_frame: turning" in lines
-    assert any(line.startswith("# column force_x: number [1] axial ") for line in lines)
-    path.write_text("\n".join(lines).replace(": turning", ": spinning") + "\n", encoding="utf-8")
-    with refused(RecordError, path, "'load_cell_frame'", "'spinning'", "'fixed'"):
-        read_record(path)

@@ -36,18 +36,12 @@ def test_every_byte_counts(tmp_path):
 
 
 def test_numbers_and_characters_have_checksums_that_hdf5_checks(tmp_path):
-    with_scalar = xr.Dataset(
-        {"x": ("n", [1.0, 2.0]), "none": ("empty", np.zeros(0)), "one": 1.0, "word": ("n", ["a", "b"])}
-    )
+    kinds = {"x": ("n", [1.0, 2.0]), "none": ("empty", np.zeros(0)), "one": 1.0, "word": ("n", ["a", "b"])}
+    with_scalar = xr.Dataset(kinds)
     write_netcdf(with_scalar, tmp_path / "a.nc")
     write_record(make_record(columns()), tmp_path / "record.nc")
     with h5py.File(tmp_path / "a.nc") as file:
-        assert {name: file[name].fletcher32 for name in ("x", "none", "one", "word")} == {
-            "x": True,
-            "none": False,
-            "one": False,
-            "word": False,
-        }
+        assert [name for name in kinds if file[name].fletcher32] == ["x"]
     with h5py.File(tmp_path / "record.nc") as file:
         assert all(file[name].fletcher32 for name in make_record(columns()))
         place = file["force_x"].id.get_chunk_info(0).byte_offset
@@ -109,10 +103,7 @@ def huge_in_little(file, other):
 
 
 def link(name, made):
-    def change(file, other):
-        file[name] = made(file, other)
-
-    return change
+    return lambda file, other: file.__setitem__(name, made(file, other))
 
 
 HOSTILE = {
@@ -136,8 +127,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("is_sealed", [False, True], ids=["foreign", "with checksum"])
-@pytest.mark.parametrize("change", HOSTILE)
+@pytest.mark.parametrize(("change", "is_sealed"), [*((name, True) for name in HOSTILE), ("external", False)])
 def test_what_leads_out_of_a_file_or_beyond_its_size_is_refused(tmp_path, change, is_sealed):
     """Before it is read: the file to which it leads has numbers that a record may have."""
     path, other = tmp_path / "record.nc", tmp_path / "other.nc"
@@ -167,15 +157,8 @@ def everything():
         "cube": (("n", "m", "k"), np.arange(12.0).reshape(3, 2, 2)),
         "nan": ("n", [np.nan, -0.0, np.inf]),
     }
-    attrs = {
-        "text": "ß",
-        "texts": ["a", "bc"],
-        "one": np.int16(3),
-        "many": np.array([1.5, -0.0]),
-        "empty": "",
-        "none": np.zeros(0),
-        "bytes": b"abc",
-    }
+    attrs = {"text": "ß", "texts": ["a", "bc"], "one": np.int16(3), "many": np.array([1.5, -0.0])}
+    attrs |= {"empty": "", "bytes": b"abc"}
     return xr.Dataset({**numbers, **more}, {"n": ["x", "long name", "z"], "m": [0.5, 1.5]}, attrs)
 
 
@@ -197,7 +180,6 @@ def test_a_file_of_another_program_is_read_as_xarray_reads_it(tmp_path, compress
     path, content = tmp_path / "a.nc", everything()
     encoding = {"packed": {"dtype": "i2", "scale_factor": 0.5, "_FillValue": -1}}
     encoding |= {"cube": {"zlib": True, "shuffle": True, "chunksizes": (1, 2, 2)}} if compressed else {}
-    content.attrs.pop("none")  # h5netcdf cannot write it
     content.to_netcdf(path, engine="h5netcdf", encoding=encoding)
     with xr.open_dataset(path, engine="h5netcdf") as file:
         expected = as_told(file.load())
@@ -251,9 +233,8 @@ def test_a_process_that_goes_wrong_over_a_file_is_a_refusal(tmp_path, monkeypatc
         "start": "import nothing_of_this_name",
     }
     script = tmp_path / "script.py"
-    script.write_text(
-        "import os\nimport numpy as np\nimport tactile_bayes.record.netcdf_content as content\n" + faults[what]
-    )
+    imports = "import os\nimport numpy as np\nimport tactile_bayes.record.netcdf_content as content\n"
+    script.write_text(imports + faults[what])
     monkeypatch.setattr("tactile_bayes.record.netcdf_content.__file__", str(script))
     path = tmp_path / "record.nc"
     make_record(columns()).to_netcdf(path, engine="h5netcdf")

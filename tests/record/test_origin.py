@@ -1,7 +1,5 @@
 """Columns of a rig: names, units, factors, signs and zeros of its own."""
 
-import re
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -21,8 +19,7 @@ from tactile_bayes.rig import Rig, make_record, read_record
     [
         ("Fx", ["Fx"], Origin("Fx")),
         ("Fx[mN]", ["Fx"], Origin("Fx", "mN")),
-        ("-Fx [mN]", ["Fx"], Origin("Fx", "mN", -1)),
-        ("- Fx[mN]", ["Fx"], Origin("Fx", "mN", -1)),
+        ("- Fx [mN]", ["Fx"], Origin("Fx", "mN", -1)),
         ("+Fx", ["Fx"], Origin("Fx")),
         ("90-Fx[mN]", ["Fx"], Origin("Fx", "mN", -1, 90.0)),
         ("-90+Fx[mN]", ["Fx"], Origin("Fx", "mN", 1, -90.0)),
@@ -34,10 +31,8 @@ from tactile_bayes.rig import Rig, make_record, read_record
         ("Fx-1[mN]", ["Fx-1", "Fx"], Origin("Fx-1", "mN")),
         ("Fx_mN", ["Fx_mN"], Origin("Fx_mN", "mN")),
         ("Fx_mm", ["Fx_mm"], Origin("Fx_mm")),
-        ("Fx", ["Fx [mN]"], Origin("Fx [mN]", "mN")),
         ("Fx[mN]", ["Fx [mN]"], Origin("Fx [mN]", "mN")),
         ("-Fx", ["Fx (mN)"], Origin("Fx (mN)", "mN", -1)),
-        ("Fx / mN", ["Fx / mN"], Origin("Fx / mN", "mN")),
         ("Fx", ["Fx / mN"], Origin("Fx / mN", "mN")),
         ("Fx (left)", ["Fx (left)", "Fx (right)"], Origin("Fx (left)")),
         ("Fx (left)[mN]", ["Fx (left)"], Origin("Fx (left)", "mN")),
@@ -70,10 +65,10 @@ def test_what_stands_for_a_column(text, names, origin):
 @pytest.mark.parametrize(
     ("target", "text", "origin"),
     [
-        ("sweep", "3", Origin(None, value=3)),
-        ("direction", "forward", Origin(None, value="forward")),
-        ("base_x", "-12[mm]", Origin(None, "mm", value=-12.0)),
-        ("base_y", "0", Origin(None, value=0.0)),
+        ("sweep", "3", Origin("", value=3)),
+        ("direction", "forward", Origin("", value="forward")),
+        ("base_x", "-12[mm]", Origin("", "mm", value=-12.0)),
+        ("base_y", "0", Origin("", value=0.0)),
         ("direction", "Sense", Origin("Sense")),
     ],
 )
@@ -100,8 +95,6 @@ def test_what_cannot_stand_for_a_column(target, text, error, named):
         origins_of({target: text}, ["Fx / mN"] if "/" in text else ["Fx"], Source())
 
 
-# --- Files ----------------------------------------------------------------------------------------------------------
-
 RIG = {
     "Zeit [s]": np.arange(6.0),
     "Hub": [0, 0, 0, 1, 1, 1],
@@ -125,9 +118,7 @@ NAMED = {
 def rig_file(path, table=RIG, *, delimiter=",", decimal=".", header=()):
     """A table as a file of a rig."""
     if path.suffix == ".nc":
-        xr.Dataset({name.replace("/", "over"): ("sample", values) for name, values in table.items()}).to_netcdf(
-            path, engine="h5netcdf"
-        )
+        xr.Dataset({name: ("sample", values) for name, values in table.items()}).to_netcdf(path, engine="h5netcdf")
         return path
     rows = [
         delimiter.join(cell if isinstance(cell, str) else repr(cell).replace(".", decimal) for cell in row)
@@ -166,21 +157,11 @@ def test_a_rig_is_read_by_its_own_names_units_signs_and_zeros(tmp_path, name, op
 
 
 def test_units_in_names_are_read_without_being_told(tmp_path):
-    table = {
-        "sweep": 0,
-        "direction": "forward",
-        "drive_angle [deg]": [60.0, 61.0],
-        "holding_moment [Nmm]": [0.0, 2.0],
-        "force_x (mN)": [0.0, -3.0],
-        "force_y/kN": [0.0, 4.0],
-        "base_x [cm]": [5.0, 5.0],
-    }
-    table = {name: np.broadcast_to(values, 2) for name, values in table.items()}
-    record = read_record(rig_file(tmp_path / "rig.csv", table), Rig(rod=WIRE))
-    read = {name: values.values.tolist() for name, values in record.items()}
-    assert read["drive_angle"] == [np.radians(60.0), np.radians(61.0)]
-    assert (read["holding_moment"], read["force_x"], read["force_y"]) == ([0, 2e-3], [0, -3e-3], [0, 4e3])
-    assert read["base_x"] == [0.05, 0.05]
+    names = "sweep,direction,drive_angle [deg],holding_moment [Nmm],force_x (mN),force_y/kN,base_x [cm]"
+    (tmp_path / "rig.csv").write_text(f"{names}\n0,forward,60,2,-3,4,5\n")
+    record = read_record(tmp_path / "rig.csv", Rig(rod=WIRE))
+    read = [record[name].item() for name in ("drive_angle", "holding_moment", "force_x", "force_y", "base_x")]
+    assert read == [np.radians(60.0), 2e-3, -3e-3, 4e3, 0.05]
     assert len(record) == 8
 
 
@@ -191,9 +172,7 @@ def test_units_in_names_are_read_without_being_told(tmp_path):
         (["A,Mz,Fx,Fy", "deg,N mm,mN,mN"], "Fx[N]", ["[mN]", "[N]"]),
         (["A,Mz,Fx [kg],Fy", "deg,N mm,,mN"], "Fx[mN]", ["kg", "mN"]),
         (["A,Mz,Fx_mN,Fy", "deg,N mm,,mN"], "Fx_mN[N]", ["mN", "[N]"]),
-        (["A,Mz,Fx_mN,Fy", "deg,N mm,N,mN"], "Fx_mN", ["mN", "N"]),
         (["# column Fx: number [N]", "A,Mz,Fx [mN],Fy", "deg,N mm,,mN"], "Fx", ["[N]", "[mN]"]),
-        (["# column Fx: number [mN]", "A,Mz,Fx,Fy", "deg,N mm,,mN"], "Fx[N]", ["[mN]", "[N]"]),
         (["# column Fx: number [mN]", "A,Mz,Fx [mN],Fy", "deg,N mm,,mN"], "Fx", None),
         (["# column Fx: number [mN]", "A,Mz,Fx,Fy", "deg,N mm,,mN"], "Fx", None),
     ],
@@ -256,10 +235,9 @@ def test_dimensionless_records_take_degrees_and_no_other_unit(tmp_path):
 
 def test_axes_may_be_exchanged(tmp_path):
     path = rig_file(tmp_path / "rig.csv", columns())
-    plain = read_record(path)
     turned = read_record(path, Rig(file={"force_x": "-force_y", "force_y": "force_x"}))
-    assert turned["force_x"].values.tolist() == (-plain["force_y"].values).tolist()
-    assert turned["force_y"].values.tolist() == plain["force_x"].values.tolist()
+    np.testing.assert_array_equal(turned["force_x"], -np.array(columns()["force_y"]))
+    np.testing.assert_array_equal(turned["force_y"], columns()["force_x"])
 
 
 SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
@@ -270,25 +248,15 @@ SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
     [
         ({}, {"force_x": "Fz[mN]"}, ["column 'Fz'", "'force_x'", "(columns: Zeit [s], Hub,"]),
         ({}, {"force_y": "90-Fyy[mN]"}, ["column 'Fyy'", "'force_y'"]),
-        ({}, {"force_y": "Fyy"}, ["mean 'Fy'"]),
         ({}, {"base_y": "height"}, ["like 12[mm]"]),
         ({}, {"direction": "up"}, ["like forward"]),
         ({"force_y": np.zeros(6)}, {}, ["line 1, column 'force_y'", "'Fy[mN]+12.5'"]),
         ({}, {"force_y": "Fy[mm]"}, ["line 1, column 'force_y'", "'Fy'", "[mm]", "N, kN, mN, µN or gf"]),
-        (
-            {},
-            {"holding_moment": "Moment[N]"},
-            ["line 1, column 'holding_moment'", "'Moment'", "[N]", "N m, N mm, mN m, µN m or mN"],
-        ),
         ({}, {"base_y": "12[deg]"}, ["'base_y'", "[deg]", "m, cm, mm or µm"]),
         ({}, {"force_x": "Fx (mN)[N]"}, ["'Fx (mN)'", "[mN]", "[N]"]),
         ({"Fy": ["1", "2", "x", "4", "5", "6"]}, {}, ["line 4, column 'Fy'", "'x'"]),
         ({"Fy": ["1", "2", "", "4", "5", "6"]}, {}, ["line 4, column 'force_y'", "'Fy'", "nan"]),
-        (
-            {"Fz [ch1]": np.zeros(6)},
-            {"force_y": "Fz [ch1]"},
-            ["line 1, column 'force_y'", "'Fz [ch1]'", "in [ch1]", "N, kN, mN, µN or gf"],
-        ),
+        ({"Fz [ch1]": np.zeros(6)}, {"force_y": "Fz [ch1]"}, ["line 1, column 'force_y'", "'Fz [ch1]'", "in [ch1]"]),
         # What is wrong with a measured column comes before a name that cannot be stored.
         (SLASHES, {}, ["the name 'a / b'", "cannot be stored", "as 'a [b]'"]),
         (SLASHES, {"force_x": "Fz"}, ["column 'Fz'", "'force_x'"]),
@@ -296,17 +264,9 @@ SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
         (
             SLASHES | {"Moment": None},
             {"holding_moment": None},
-            [
-                "(columns: Zeit [s], Hub, Richtung, Winkel [°], Fx (mN), Fy, a / b, a [b])",
-                "Rig(file={'holding_moment': 'NAME[UNIT]'})",
-                'holding_moment = "NAME[UNIT]"',
-            ],
+            [", Fy, a / b, a [b])", 'holding_moment = "NAME[UNIT]"'],
         ),
-        (
-            {"Winkel [°]": None, "drive/angle": np.ones(6)},
-            {"drive_angle": None},
-            ["'drive/angle'", "mean 'drive_angle'", "Rig(file={'drive_angle': 'drive/angle'})"],
-        ),
+        ({"Winkel [°]": None, "drive/angle": np.ones(6)}, {"drive_angle": None}, ["{'drive_angle': 'drive/angle'}"]),
     ],
 )
 def test_what_does_not_fit_the_file_is_refused_with_its_place(tmp_path, changes, given, named):
@@ -334,22 +294,20 @@ def test_a_further_column_with_a_slash_is_kept_under_a_name_that_every_file_can_
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("given", "correction", "offset", "sign"),
     [
-        ("A", "Rig(file={'drive_angle': 'A[deg]'}), or drive_angle = \"A[deg]\""),
-        ("-A", "Rig(file={'drive_angle': '-A[deg]'})"),
-        ("-A+90", "Rig(file={'drive_angle': '90-A[deg]'})"),
-        ("A-0.5", "Rig(file={'drive_angle': '-0.5+A[deg]'})"),
+        ("A", "A[deg]", 0, 1),
+        ("-A", "-A[deg]", 0, -1),
+        ("-A+90", "90-A[deg]", 90, -1),
+        ("A-0.5", "-0.5+A[deg]", -0.5, 1),
     ],
 )
-def test_what_looks_like_degrees_may_be_said_to_be_in_the_words_of_the_file(tmp_path, given, message):
+def test_what_looks_like_degrees_is_refused_with_an_entry_that_reads_it(tmp_path, given, correction, offset, sign):
     table = {**columns(sweep=None, direction=None, drive_angle=None), "A": np.degrees(columns()["drive_angle"])}
     path = rig_file(tmp_path / "rig.csv", table)
-    with refused(RecordError, message):
+    with refused(RecordError, f"Rig(file={{'drive_angle': '{correction}'}}), or drive_angle = \"{correction}\""):
         read_record(path, Rig(file={"drive_angle": given, "split_sweeps": True}))
-    correction = re.search(r"'drive_angle': '(.*?)'", message)[1]
     record = read_record(path, Rig(file={"drive_angle": correction, "split_sweeps": True}))
-    offset, sign = {"A": (0, 1), "-A": (0, -1), "-A+90": (90, -1), "A-0.5": (-0.5, 1)}[given]
     np.testing.assert_allclose(record["drive_angle"], np.radians(offset + sign * table["A"]), rtol=1e-12)
 
 

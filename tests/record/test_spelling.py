@@ -8,7 +8,7 @@ import pytest
 from helpers.record_tables import WIRE
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.parsing import number_in
 from tactile_bayes.rig import GrowingRecord, Rig, read_record
 
 COLUMNS = {"holding_moment": "Mz[N mm]", "force_x": "Fx[mN]", "force_y": "Fy[mN]"}
@@ -57,7 +57,6 @@ def test_what_can_be_read_once_only_is_refused_before_it_is_opened(tmp_path, kin
         os.mkfifo(path)
     else:
         path.symlink_to("/dev/zero")
-    with refused(RecordError, "record.csv is a pipe or a device"):
-        read_record(path)
-    with refused(RecordError, "record.csv is a pipe or a device"):
-        GrowingRecord(path)
+    for read in (read_record, GrowingRecord):
+        with refused(RecordError, "record.csv is a pipe or a device"):
+            read(path)

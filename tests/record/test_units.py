@@ -31,12 +31,10 @@ def test_units_convert_there_and_back(values, length, rigidity, diameter, turn):
     )
     dimensionless = to_dimensionless(si)
     # One division or multiplication each, correctly rounded.
-    assert np.array_equal(dimensionless["force_x"], si["force_x"] / rod.force_unit)
-    assert np.array_equal(dimensionless["truth_force_y"], si["truth_force_y"] / rod.force_unit)
-    assert np.array_equal(dimensionless["holding_moment"], si["holding_moment"] / rod.moment_unit)
-    assert np.array_equal(dimensionless["base_x"], si["base_x"] / rod.length)
-    assert np.array_equal(dimensionless["truth_contact_x"], si["truth_contact_x"] / rod.length)
-    assert np.array_equal(dimensionless["drive_angle"], si["drive_angle"])
+    units = {"force": rod.force_unit, "moment": rod.moment_unit, "base": rod.length, "contact": rod.length}
+    for name in (*names, "base_x", "drive_angle"):
+        unit = next((size for part, size in units.items() if part in name), 1.0)
+        assert np.array_equal(dimensionless[name], si[name] / unit), name
     curvature = rod.rest_curvature / rod.curvature_unit
     assert rod_of(dimensionless) == Rod(diameter=rod.diameter / length, rest_curvature=curvature)
     assert dimensionless.attrs["load_cell_force_noise"] == 0.5 / rod.force_unit

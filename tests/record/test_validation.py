@@ -7,8 +7,10 @@ import xarray as xr
 from helpers.record_tables import WIRE, columns, edited
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import validate
+from tactile_bayes.record import CHANNELS, validate
 from tactile_bayes.rig import Rig, make_record
+
+ONLY_MOMENT = Rig(file={"missing": ("force_x", "force_y")})
 
 
 def test_validation_completes_a_dataset_and_leaves_its_argument_alone():
@@ -27,45 +29,24 @@ def test_validation_completes_a_dataset_and_leaves_its_argument_alone():
     [
         (columns(drive_angle=None), ["column 'drive_angle'", "(columns: sweep, direction, base_x, base_y,"]),
         (columns(drive_angle=None, DriveAngle=np.zeros(6)), ["no column 'drive_angle'", "a column 'DriveAngle'"]),
-        (
-            columns(force_x=None, force_z=np.zeros(6)),
-            ["no column 'force_x'", "a column 'force_z'", "Rig(file={'missing': ['force_x']})"],
-        ),
+        (columns(force_x=None, force_z=np.zeros(6)), ["no column 'force_x'", "a column 'force_z'"]),
         (columns(force_x=None), ["Rig(file={'missing': ['force_x']})"]),
-        (
-            columns(base_x=None, Base_X=np.zeros(6)),
-            ["no column 'base_x'", "a column 'Base_X'", "add a column 'base_x'"],
-        ),
+        (columns(base_x=None, Base_X=np.zeros(6)), ["no column 'base_x'", "a column 'Base_X'"]),
         (columns(force_y=np.zeros(5)), ["'force_y'", "(5,)", "(6,)"]),
         (edited("force_x", 4, "0,3"), ["sample 4, column 'force_x'", "'0,3'"]),
-        (edited("force_x", 4, "1_0"), ["sample 4, column 'force_x'", "'1_0'"]),
         (edited("force_x", 4, np.nan), ["sample 4, column 'force_x'", "nan"]),
         (edited("holding_moment", 1, -np.inf), ["sample 1, column 'holding_moment'", "-inf"]),
-        (edited("drive_angle", 2, np.nan), ["sample 2, column 'drive_angle'", "nan"]),
         (edited("drive_angle", 2, "up"), ["sample 2, column 'drive_angle'", "'up'"]),
         (edited("base_y", 3, np.inf), ["sample 3, column 'base_y'", "inf"]),
-        (edited("sweep", 3, "one"), ["sample 3, column 'sweep'", "'one'"]),
         (edited("sweep", 3, 0.5), ["sample 3, column 'sweep'", "0.5"]),
         (edited("direction", 5, "back"), ["sample 5, column 'direction'", "'back'", "'forward' or"]),
         (columns(direction=np.zeros(6)), ["sample 0, column 'direction'", "0.0"]),
-        (
-            columns(drive_angle=np.degrees(columns()["drive_angle"])),
-            ["sample 0, column 'drive_angle'", "57.29577951308232", "degrees", "numpy.radians", "0.017453292519943295"],
-        ),
-        (
-            columns(drive_angle=[1.0, 1.1, 1.2, 1.8, 1.9, 2.0]),
-            ["sweep 1", "'backward'", "1.8 rad (sample 3)", "2.0 rad (sample 5)", "'forward'"],
-        ),
-        (
-            edited("direction", 1, "backward"),
-            ["sweep 0", "'direction'", "'forward' (sample 0)", "'backward' (sample 1)"],
-        ),
+        (columns(drive_angle=np.degrees(columns()["drive_angle"])), ["sample 0, column 'drive_angle'", "degrees"]),
+        (columns(drive_angle=[1.0, 1.1, 1.2, 1.8, 1.9, 2.0]), ["sweep 1", "1.8 rad (sample 3)", "2.0 rad (sample 5)"]),
+        (edited("direction", 1, "backward"), ["sweep 0", "'forward' (sample 0)", "'backward' (sample 1)"]),
         (columns(base_x=[0.0, 0.0, 0.5, 1.0, 1.0, 1.0]), ["sweep 0", "'base_x'", "0.0 (sample 0)", "0.5 (sample 2)"]),
         ({name: [] for name in columns()}, ["no samples"]),
-        (
-            columns(holding_moment=[np.nan] * 6, force_x=[np.nan] * 6, force_y=[np.nan] * 6),
-            ["is empty", "holding_moment, force_x"],
-        ),
+        (columns(**dict.fromkeys(CHANNELS, [np.nan] * 6)), ["is empty", "holding_moment, force_x"]),
         (columns(truth_force_x=["a"] * 6), ["sample 0, column 'truth_force_x'", "'a'"]),
         (columns(time=np.zeros(6, "datetime64[s]")), ["column 'time'", "np.datetime64('1970-01-01T00:00:00')"]),
         (columns(**{"a/b": np.zeros(6), "a|b": np.zeros(6)}), ["'a/b'", "cannot be stored"]),
@@ -122,16 +103,16 @@ def test_encoder_noise_does_not_hide_the_direction_of_a_sweep(direction, noise):
     angle = np.radians(60 + 0.25 * (np.arange(200) + noise * np.random.default_rng(1).standard_normal(200)))
     table = {"sweep": 0, "drive_angle": angle if direction == "forward" else angle[::-1], "holding_moment": 0.1}
     other = "backward" if direction == "forward" else "forward"
-    make_record({**table, "direction": direction}, Rig(file={"missing": ("force_x", "force_y")}))
+    make_record({**table, "direction": direction}, ONLY_MOMENT)
     with refused(RecordError, f"sweep 0 is labelled {other!r}"):
-        make_record({**table, "direction": other}, Rig(file={"missing": ("force_x", "force_y")}))
+        make_record({**table, "direction": other}, ONLY_MOMENT)
 
 
 @pytest.mark.parametrize("samples", [1, 2, 100])
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_a_drive_at_rest_has_either_direction(samples, direction):
     table = {"sweep": 0, "direction": direction, "drive_angle": np.full(samples, 1.1), "holding_moment": 0.1}
-    make_record(table, Rig(file={"missing": ("force_x", "force_y")}))
+    make_record(table, ONLY_MOMENT)
 
 
 def test_a_whole_turn_may_be_read_by_an_encoder_whose_zero_is_off():

@@ -28,7 +28,7 @@ def as_typed(word: str) -> str:
     """
     if word.isascii():
         return word
-    from tactile_bayes.record.cell import number_in
+    from tactile_bayes.record.parsing import number_in
     from tactile_bayes.record.spelling import plain, plain_number
 
     option = word.lstrip("-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}")

@@ -12,7 +12,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.rods.along import Along, text_along
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attribute_names import misspelt
-from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.parsing import number_in
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
 from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source

@@ -110,7 +110,7 @@ def _asked(topics: Mapping[str, Topic], columns: Mapping[str, str], source: Sour
     homes = {f"{topic}.{name}": (topic, name) for topic, found in topics.items() for name in found.fields}
     origins = {target: origin for target, origin in origins_of(columns, homes, source).items() if origin.column}
     found = []
-    for name in dict.fromkeys(str(origins[t].column) for t in (*CHANNELS, *MEASURED, *origins) if t in origins):
+    for name in dict.fromkeys(origins[t].column for t in (*CHANNELS, *MEASURED, *origins) if t in origins):
         topic, inner = homes[name]
         targets = tuple(target for target, origin in origins.items() if origin.column == name)
         turn = _turn_in(origins["drive_angle"].unit) if "drive_angle" in targets else None

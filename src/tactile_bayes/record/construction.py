@@ -13,7 +13,7 @@ import xarray as xr
 from tactile_bayes.checks import check_mapping, refused, unmasked
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import completed_attributes
-from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.parsing import number_in
 from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import checked_record

@@ -11,8 +11,8 @@ from statistics import mean, median
 from typing import BinaryIO
 
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
-from tactile_bayes.record.cell import number_with_comma
 from tactile_bayes.record.csv_header import Header, cells_in
+from tactile_bayes.record.parsing import number_with_comma
 
 _TAIL = 1 << 16  # bytes of the end of a file in which rows are compared with the last one
 # Largest number of rows that are compared; smallest numbers for a comparison of values, and of notations.

@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.cell import number_with_comma
 from tactile_bayes.record.csv_end import without_cut_row
 from tactile_bayes.record.csv_header import (
     FORMAT,
@@ -28,6 +27,7 @@ from tactile_bayes.record.csv_header import (
 from tactile_bayes.record.csv_rows import Layout, read_rows
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of
+from tactile_bayes.record.parsing import number_with_comma
 from tactile_bayes.record.quantity import Unit, unit_of, units_disagree
 from tactile_bayes.record.rig_entry import file_entry
 from tactile_bayes.record.schema import MEASURED, Kind

@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.attribute_names import stray_attribute
-from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
+from tactile_bayes.record.parsing import integer_in, is_integer_text, number_in
 from tactile_bayes.record.quantity import accepted_units, converted, same_quantity
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
 from tactile_bayes.record.spelling import visible

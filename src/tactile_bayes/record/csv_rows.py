@@ -12,9 +12,8 @@ from typing import Any, BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import CUT_BY_NUL, WITH_NUL, not_utf8
-from tactile_bayes.record.parsing import text_array
+from tactile_bayes.record.parsing import integer_in, is_integer_text, number_in, text_array
 from tactile_bayes.record.schema import Kind
 from tactile_bayes.record.spelling import look_alikes, plain_number
 from tactile_bayes.record.table import Source

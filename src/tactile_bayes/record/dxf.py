@@ -12,7 +12,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 
 _CURVES = "LINE LWPOLYLINE POLYLINE ARC CIRCLE ELLIPSE SPLINE"
-
 # Size of a unit of the drawing, by its number in $INSUNITS; 0 is none.
 _METRES = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}
 _COARSENESS = 1e-5  # largest distance of a curve from its segments, as a share of its size
@@ -24,9 +23,8 @@ def curves_in(path: Path) -> tuple[list[Floats], float]:
     try:
         import ezdxf
     except ImportError as error:
-        raise ParameterError(
-            f"{path}: drawings are read by the package ezdxf, which is not installed: pip install 'tactile-bayes[dxf]'"
-        ) from error
+        what = "drawings are read by the package ezdxf, which is not installed: pip install 'tactile-bayes[dxf]'"
+        raise ParameterError(f"{path}: {what}") from error
     try:
         drawing: Any = ezdxf.readfile(path)  # type: ignore[attr-defined]
     except (ezdxf.DXFError, UnicodeDecodeError) as error:  # type: ignore[attr-defined]
@@ -42,9 +40,8 @@ def curves_in(path: Path) -> tuple[list[Floats], float]:
     if not pieces:
         found = Counter(each.dxftype() for each in drawing.modelspace())
         there = ", ".join(f"{count} {kind}" for kind, count in found.items()) or "nothing"
-        raise ParameterError(
-            f"{path}: no curve is shown in its model space ({there}): draw a polyline, and explode blocks"
-        )
+        what = f"no curve is shown in its model space ({there}): draw a polyline, and explode blocks"
+        raise ParameterError(f"{path}: {what}")
     return pieces, _METRES.get(unit, 0.0)
 
 

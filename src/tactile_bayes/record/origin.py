@@ -48,7 +48,7 @@ _UNIT_IN_NAME = re.compile(
 class Origin:
     """Origin of a column of a record: offset + sign · factor · (a column of the file), or one value for all samples."""
 
-    column: str | None
+    column: str  # "" for a value
     unit: str | None = None  # of column (times factor) and offset, if it is given with the column or in its name
     sign: int = 1
     offset: float = 0.0
@@ -57,7 +57,7 @@ class Origin:
 
     def __str__(self) -> str:
         """Return the origin in the form that `read_record` takes, without the unit."""
-        if self.column is None:
+        if not self.column:
             return str(self.value)
         sign = "-" if self.sign < 0 else "+" if self.offset else ""
         return f"{f'{self.offset:.15g}' if self.offset else ''}{sign}{self.scaled}"
@@ -77,7 +77,7 @@ def column_entry(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, di
     stored = column.encoding.get(ORIGIN) or column.attrs.get(ORIGIN)
     origin = Origin(**json.loads(stored)) if stored else Origin(name, unit)
     pair = same_quantity(unit, origin.unit or unit)
-    if pair is None or origin.column is None:
+    if pair is None or not origin.column:
         return ""
     number = float(converted(added, *pair))
     if number:
@@ -117,15 +117,13 @@ def any_meant(columns: Mapping[str, str], names: Iterable[str]) -> bool:
         return True
     texts = [plain(str(text)).strip() for text in columns.values()]
     named = [text for text in texts if not (_VALUE.fullmatch(text) or text in DIRECTIONS)]
-    readings = [origin for text in named for origin in _readings(text)]
-    return any(origin.column is not None and found_column(origin.column, names) is not None for origin in readings)
+    return any(found_column(origin.column, names) is not None for text in named for origin in _readings(text))
 
 
 def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str, Kind]:
     """Return the kinds of the columns of a file that belong to a record."""
     kinds = {name: column.kind for name in names if (column := column_of(name)) is not None}
-    kinds |= {origin.column: _column(target).kind for target, origin in origins.items() if origin.column is not None}
-    return kinds
+    return kinds | {origin.column: _column(target).kind for target, origin in origins.items() if origin.column}
 
 
 def renamed(table: Table, columns: Mapping[str, str]) -> Table:
@@ -136,7 +134,7 @@ def renamed(table: Table, columns: Mapping[str, str]) -> Table:
     forms = Counter(map(storable, further))
     called = {name: storable(name) if forms[storable(name)] == 1 else name for name in further}
     aliases = {other: name for name, other in called.items() if other != name}
-    aliases |= {target: origin.column for target, origin in origins.items() if origin.column is not None}
+    aliases |= {target: origin.column for target, origin in origins.items() if origin.column}
     heads = dict(table.source.heads)
     heads |= {name: heads[alias] for name, alias in aliases.items() if alias in heads}
     given = {target: str(origin) for target, origin in origins.items()}
@@ -149,7 +147,7 @@ def renamed(table: Table, columns: Mapping[str, str]) -> Table:
             attrs = {**attrs, ORIGIN: json.dumps(asdict(Origin(name, str(attrs["units"]))))}
         cells[other] = (values, attrs if other == name else {"long_name": name, **attrs})
     for target, origin in origins.items():
-        if origin.column is None:
+        if not origin.column:
             cells[target] = (np.full(table.samples, origin.value), {"units": origin.unit} if origin.unit else {})
         else:
             values, attrs = _cells(target, origin, table.columns[origin.column], used[origin.column] > 1, source)
@@ -159,7 +157,6 @@ def renamed(table: Table, columns: Mapping[str, str]) -> Table:
 
 def _of_file(origin: Origin, unit: Any) -> str:
     """Return an origin as text for an attribute, with the unit of the file, and as a name that `read_record` takes."""
-    assert origin.column is not None
     is_stated = origin.unit is None or stem_and_unit(origin.column)[1] is not None
     column = origin.column if is_stated else f"{origin.column}[{origin.unit}]"
     return json.dumps(asdict(replace(origin, column=column, unit=unit)))
@@ -197,14 +194,14 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
     if plain(text) != text:
         readings += _readings(plain(text))
     for origin in readings:
-        name = None if origin.column is None else found_column(origin.column, names)
+        name = found_column(origin.column, names)
         if name is not None:
-            is_whole = _compact(name) == _compact(origin.column or "")
+            is_whole = _compact(name) == _compact(origin.column)
             return _checked(target, column, replace(origin, column=name), is_whole, text, source)
     value = _value(target, plain(text))
     if value is not None:
         return value
-    wanted = readings[-1].column or text
+    wanted = readings[-1].column
     near = nearest(wanted, names)
     hint = f"did you mean {near!r}?" if near else "write NAME[UNIT], with a minus before it for the opposite sign"
     if target in names:
@@ -262,7 +259,6 @@ def _checked(target: str, column: Column, origin: Origin, is_whole: bool, text: 
         return origin
     if not 0.0 < origin.factor < math.inf:
         raise ParameterError(f"{given}: give a factor above zero, like 1e-3*Fx[N]")
-    assert origin.column is not None
     _, in_name = stem_and_unit(origin.column)
     if in_name is None:
         in_name = _ending(origin.column, column)
@@ -298,15 +294,15 @@ def _value(target: str, text: str) -> Origin | None:
     """Parse a value for all samples, if the text is one and the column can have it."""
     match = _VALUE.fullmatch(text)
     if target == "direction":
-        return Origin(None, value=text) if text in DIRECTIONS else None
+        return Origin("", value=text) if text in DIRECTIONS else None
     if match is None:
         return None
     if target not in CONSTANTS:
         what = f"columns: {text!r} is given for {target!r}, which is measured"
         raise ParameterError(f"{what}: name a column of the file, or declare a channel missing")
     if target == "sweep":
-        return Origin(None, value=int(text)) if re.fullmatch(r"[+-]?[0-9]+", text) else None
-    return Origin(None, unit=match["unit"], value=float(match["number"]))
+        return Origin("", value=int(text)) if re.fullmatch(r"[+-]?[0-9]+", text) else None
+    return Origin("", unit=match["unit"], value=float(match["number"]))
 
 
 def _column(name: str) -> Column:

@@ -13,11 +13,11 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_kind, check_path
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.csv_header import column_described
 from tactile_bayes.record.dxf import curves_in
 from tactile_bayes.record.encoding import not_utf8
 from tactile_bayes.record.origin import stem_and_unit
+from tactile_bayes.record.parsing import number_in
 from tactile_bayes.record.quantity import accepted_units, same_quantity
 
 _CALLED = {"m": "a unit of length", "1": "rod lengths"}

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations, product
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -47,27 +46,25 @@ MEASURED = ("sweep", "direction", "base_x", "base_y", "drive_angle", *CHANNELS)
 # Columns that a table must have to be a record (a channel may be empty); base_x and base_y are 0 by default.
 REQUIRED = ("sweep", "direction", "drive_angle", *CHANNELS)
 # All columns with a known meaning; the prefix `truth_` means the same quantity without error.
-COLUMNS: Mapping[str, Column] = MappingProxyType(
-    {
-        column.name: column
-        for column in (
-            Column("sweep", "integer", "1", None, "number of the sweep"),
-            Column("direction", "text", "1", None, "sense of the drive"),
-            Column("base_x", "number", "m", "length_unit", "horizontal position of the pivot"),
-            Column("base_y", "number", "m", "length_unit", "vertical position of the pivot"),
-            Column("drive_angle", "number", "rad", None, "slope of the rod at the pivot"),
-            Column("holding_moment", "number", "N m", "moment_unit", "moment that the drive must hold"),
-            Column("force_x", "number", "N", "force_unit", "horizontal support reaction", "axial support reaction"),
-            Column("force_y", "number", "N", "force_unit", "vertical support reaction", "transversal support reaction"),
-            Column("slope_angle", "number", "rad", None, "slope angle of the contour at the contact"),
-            Column("tip_angle", "number", "rad", None, "slope of the rod at the contact"),
-            Column("contact_x", "number", "m", "length_unit", "horizontal position of the contact"),
-            Column("contact_y", "number", "m", "length_unit", "vertical position of the contact"),
-            Column("contact_arclength", "number", "m", "length_unit", "arc length from pivot to contact"),
-            Column("contact_phase", "text", "1", None, "phase of the contact"),
-        )
-    }
-)
+COLUMNS: Mapping[str, Column] = {
+    column.name: column
+    for column in (
+        Column("sweep", "integer", "1", None, "number of the sweep"),
+        Column("direction", "text", "1", None, "sense of the drive"),
+        Column("base_x", "number", "m", "length_unit", "horizontal position of the pivot"),
+        Column("base_y", "number", "m", "length_unit", "vertical position of the pivot"),
+        Column("drive_angle", "number", "rad", None, "slope of the rod at the pivot"),
+        Column("holding_moment", "number", "N m", "moment_unit", "moment that the drive must hold"),
+        Column("force_x", "number", "N", "force_unit", "horizontal support reaction", "axial support reaction"),
+        Column("force_y", "number", "N", "force_unit", "vertical support reaction", "transversal support reaction"),
+        Column("slope_angle", "number", "rad", None, "slope angle of the contour at the contact"),
+        Column("tip_angle", "number", "rad", None, "slope of the rod at the contact"),
+        Column("contact_x", "number", "m", "length_unit", "horizontal position of the contact"),
+        Column("contact_y", "number", "m", "length_unit", "vertical position of the contact"),
+        Column("contact_arclength", "number", "m", "length_unit", "arc length from pivot to contact"),
+        Column("contact_phase", "text", "1", None, "phase of the contact"),
+    )
+}
 DIRECTIONS = ("forward", "backward")  # senses of the drive: increasing and decreasing drive angles
 # Values of the attribute `load_cell_frame` of a record: force_x and force_y along the axes x and y of the laboratory,
 # or along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0).
@@ -77,56 +74,52 @@ _GAIN_UNITS = {("N", "N m"): "1/m", ("N m", "N"): "m"}
 
 # Quantities in a load cell's data sheet, with their units in SI; `LoadCell` describes them. As attributes of a record
 # their names begin with "load_cell_".
-LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
-    {
-        "force_noise": "N",
-        "moment_noise": "N m",
-        "degrees_of_freedom": "1",
-        "relative_noise": "1",
-        **{f"correlation_{one}_{other}": "1" for one, other in combinations(CHANNELS, 2)},
-        **{f"bias_{name}": COLUMNS[name].unit for name in CHANNELS},
-        **{f"bias_uncertainty_{name}": COLUMNS[name].unit for name in CHANNELS},
-        "random_walk_moment": "N m",
-        "random_walk_force": "N",
-        "ornstein_uhlenbeck_moment": "N m",
-        "ornstein_uhlenbeck_force": "N",
-        "ornstein_uhlenbeck_time": "1",
-        **{
-            f"gain_{to}_{of}": _GAIN_UNITS.get((COLUMNS[to].unit, COLUMNS[of].unit), "1")
-            for to, of in product(CHANNELS, CHANNELS)
-        },
-        "lever_x": "m",
-        "lever_y": "m",
-        "moment_curve_quadratic": "1/N/m",
-        "moment_curve_cubic": "1/N²/m²",
-        "lag": "1",
-        "play": "1",
-        "force_range": "N",
-        "moment_range": "N m",
-        "force_resolution": "N",
-        "moment_resolution": "N m",
-        "drive_angle_offset": "rad",
-        "drive_angle_backlash": "rad",
-        "drive_angle_noise": "rad",
-        "drive_angle_resolution": "rad",
-    }
-)
+LOAD_CELL_UNITS: Mapping[str, str] = {
+    "force_noise": "N",
+    "moment_noise": "N m",
+    "degrees_of_freedom": "1",
+    "relative_noise": "1",
+    **{f"correlation_{one}_{other}": "1" for one, other in combinations(CHANNELS, 2)},
+    **{f"bias_{name}": COLUMNS[name].unit for name in CHANNELS},
+    **{f"bias_uncertainty_{name}": COLUMNS[name].unit for name in CHANNELS},
+    "random_walk_moment": "N m",
+    "random_walk_force": "N",
+    "ornstein_uhlenbeck_moment": "N m",
+    "ornstein_uhlenbeck_force": "N",
+    "ornstein_uhlenbeck_time": "1",
+    **{
+        f"gain_{to}_{of}": _GAIN_UNITS.get((COLUMNS[to].unit, COLUMNS[of].unit), "1")
+        for to, of in product(CHANNELS, CHANNELS)
+    },
+    "lever_x": "m",
+    "lever_y": "m",
+    "moment_curve_quadratic": "1/N/m",
+    "moment_curve_cubic": "1/N²/m²",
+    "lag": "1",
+    "play": "1",
+    "force_range": "N",
+    "moment_range": "N m",
+    "force_resolution": "N",
+    "moment_resolution": "N m",
+    "drive_angle_offset": "rad",
+    "drive_angle_backlash": "rad",
+    "drive_angle_noise": "rad",
+    "drive_angle_resolution": "rad",
+}
 # Attributes that are quantities, with their units in an SI record.
-ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
-    {
-        "rod_length": "m",
-        "rod_flexural_rigidity": "N m²",
-        "rod_diameter": "m",
-        "rod_rest_curvature": "1/m",
-        "rod_rest_curvature_deviation": "1/m",
-        "rod_taper": "1",
-        "rod_rigidity_profile": "1",
-        "rod_stem": "m",
-        "rod_rest_shape_modes": "1/m",
-        "rod_taper_deviation": "1",
-        **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
-    }
-)
+ATTRIBUTE_UNITS: Mapping[str, str] = {
+    "rod_length": "m",
+    "rod_flexural_rigidity": "N m²",
+    "rod_diameter": "m",
+    "rod_rest_curvature": "1/m",
+    "rod_rest_curvature_deviation": "1/m",
+    "rod_taper": "1",
+    "rod_rigidity_profile": "1",
+    "rod_stem": "m",
+    "rod_rest_shape_modes": "1/m",
+    "rod_taper_deviation": "1",
+    **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
+}
 
 
 def column_of(name: str) -> Column | None:

@@ -57,9 +57,8 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
     stated = rod_of(record)
     if record.attrs.get("units") == "SI":
         if not same_rod(stated, rod):
-            raise RecordError(
-                f"the record is SI already, with {stated}; for what {rod} would have given, make it dimensionless first"
-            )
+            what = f"the record is SI already, with {stated}"
+            raise RecordError(f"{what}; for what {rod} would have given, make it dimensionless first")
         return record
     in_lengths = rod.in_lengths()
     if not same_rod(stated, in_lengths):
