@@ -242,10 +242,7 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         (["# units: SI", "# units: SI", HEADER, ROW], ["line 2", "'units'", "second time"]),
         (["# units: SI", "# rod_length: 200 [mN]", HEADER, ROW], ["line 2", "rod_length", "[mN]", "m, cm, mm or"]),
         (["# units: SI", "# rod_length: long", HEADER, ROW], ["line 2", "rod_length", "'long'"]),
-        (
-            ["# units: dimensionless", "# load_cell_lever_x: 0.1 [m]", HEADER, ROW],
-            ["line 2", "lever_x", "[m]", "takes 1"],
-        ),
+        (["# units: dimensionless", "# load_cell_lag: 0.1 [m]", HEADER, ROW], ["line 2", "load_cell_lag", "takes 1"]),
         (["# column time: clock [s]", HEADER, ROW], ["line 1", "'clock'", "no kind"]),
         (["# column n: integer [1]", HEADER + ",n", ROW + ",1.5"], ["line 3, column 'n'", "'1.5'"]),
         (
