@@ -6,7 +6,6 @@ import pytest
 import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.load_cell import zero_load
 from tactile_bayes.record import carried_sweeps, travels_of
 from tactile_bayes.rig import Rig
 
@@ -103,15 +102,6 @@ def test_travels_are_ways_where_the_base_is_carried():
     travels = travels_of(record)
     np.testing.assert_array_equal(travels[turned], record.drive_angle.values[turned])
     np.testing.assert_allclose(travels[~turned], 0.01 * np.arange(161), atol=1e-12)
-
-
-def test_unloaded_stretches_end_at_travels():
-    scan = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE])
-    found = zero_load(CELL.measure(scan.record, rng=1))
-    for number in (0, 2):
-        before, after = found["snap_off_travel"].sel(sweep=number).values
-        assert before <= scan.sweeps[number].snap_off.travel <= after
-    assert "onset_travel" not in zero_load(CELL.measure(tb.scan(CIRCLE).record, rng=1))
 
 
 def test_an_inspection_reports_travels_and_finds_lost_samples():

@@ -67,7 +67,7 @@ def test_a_file_is_the_same_in_pieces_as_whole(tmp_path, table):
     path.write_bytes(table.encode())
     whole = outcome(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(csv_rows, "_CHUNK", 100)
+        patch.setattr(csv_rows, "_ROWS", 3)
         in_pieces = outcome(path)
     # of several refusals it depends on the pieces which one comes first
     assert in_pieces == whole or (isinstance(whole, str) and isinstance(in_pieces, str))
@@ -95,14 +95,14 @@ def test_digits_become_the_nearest_double(tmp_path, decimal, numbers):
     path = tmp_path / "record.csv"
     path.write_text("sweep;force_x\n" + "".join(f"0;{text.replace('.', decimal)}\n" for text in texts))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(csv_rows, "_CHUNK", 100)
+        patch.setattr(csv_rows, "_ROWS", 3)
         values = read_csv(path, {}).columns["force_x"][0]
     assert values.tobytes() == np.array([float(text) for text in texts]).tobytes()
 
 
 @pytest.mark.parametrize("where", [0, 50, 100])
 def test_a_long_remark_among_many_short_ones(tmp_path, monkeypatch, where):
-    monkeypatch.setattr(csv_rows, "_CHUNK", 200)
+    monkeypatch.setattr(csv_rows, "_ROWS", 3)
     path = tmp_path / "record.csv"
     notes = ["", "ab"] * 50
     notes.insert(where, "x" * 1000)

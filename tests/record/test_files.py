@@ -17,7 +17,6 @@ from tactile_bayes.record import (
     FRAMES,
     column_of,
     parsing,
-    present_channels,
     record_hash,
     rod_of,
     write_record,
@@ -207,18 +206,6 @@ def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
     write_record(make_record(columns()), path)
     with refused(RecordError, f"but {WIRE} was given"):
         read_record(path, Rig(rod=WIRE))
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".nc"])
-def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
-    path = tmp_path / f"record{suffix}"
-    if suffix == ".csv":
-        write_text(path, "sweep,direction,drive_angle,holding_moment", "0,forward,1.25,0.5")
-    else:
-        make_record(columns()).drop_vars(["force_x", "force_y"]).to_netcdf(path, engine="h5netcdf")
-    with refused(RecordError, "Rig(file={'missing': ['force_x']})"):
-        read_record(path, Rig(file={"missing": ("force_y",)}))
-    assert present_channels(read_record(path, Rig(file={"missing": ("force_x", "force_y")}))) == ("holding_moment",)
 
 
 @pytest.mark.parametrize(

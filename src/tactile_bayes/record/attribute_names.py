@@ -29,18 +29,14 @@ def unused(attrs: Mapping[str, Any]) -> list[str]:
 
 
 def misspelt(name: str, value: Any) -> str | None:
-    """Return why an attribute is probably a misspelt one; else None.
-
-    Numbers under a name that begins with `rod_` or `load_cell_` are, and texts if the name is similar to a known one.
-    """
+    """Return why an attribute, a number named `rod_…` or `load_cell_…` or a name like a known one, may be misspelt."""
     if name in USED:
         return None
     prefix = next((prefix for prefix in _PREFIXES if name.startswith(prefix)), None)
     if prefix is not None and (_is_quantity(value) or _likely(name, prefix)):
         return no_entry(name.removeprefix(prefix), prefix)
-    if is_misspelling(_letters(name), "units") and isinstance(value, str) and value.lower() in map(str.lower, UNITS):
-        return "it is no attribute of a record: did you mean 'units'?"
-    meant = _likely(name)
+    is_unit = isinstance(value, str) and value.lower() in map(str.lower, UNITS)
+    meant = "units" if is_unit and is_misspelling(_letters(name), "units") else _likely(name)
     return None if meant is None else f"it is no attribute of a record: did you mean {meant!r}?"
 
 

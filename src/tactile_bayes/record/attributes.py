@@ -71,11 +71,9 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
     except ParameterError as error:
         raise source.error(str(error)) from error
     if units == "dimensionless" and not rod.is_dimensionless:
-        what = "the record is dimensionless, but states "
-        what += (
-            f"rod_length {rod.length!r} and rod_flexural_rigidity {rod.flexural_rigidity!r}, which are the units there"
-        )
-        raise source.error(f"{what}, 1.0: if the columns are SI, say so in 'units'; else remove the two")
+        size = f"rod_length {rod.length!r} and rod_flexural_rigidity {rod.flexural_rigidity!r}"
+        what = f"the record is dimensionless, but states {size}, which are the units there, 1.0"
+        raise source.error(f"{what}: if the columns are SI, say so in 'units'; else remove the two")
     return rod
 
 
@@ -117,10 +115,8 @@ def completed_attributes(
         completed = {"load_cell_frame": frame, **completed}
         stated_in = stated_frame(completed, source)
         if stated_in != frame:
-            what = (
-                f"the record states load_cell_frame {stated_in!r}, but {frame!r} was given: leave out the one that is "
-            )
-            raise source.error(f"{what}wrong; to convert a record use in_frame(record, frame)")
+            what = f"the record states load_cell_frame {stated_in!r}, but {frame!r} was given"
+            raise source.error(f"{what}: leave out the wrong one; to convert a record use in_frame(record, frame)")
     if "units" not in completed:
         of_the_rod = [name for name in attrs if name not in without_rod(attrs)]
         if of_the_rod:

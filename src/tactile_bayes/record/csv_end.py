@@ -23,15 +23,12 @@ _NOTATION = re.compile(r"[+-]?[0-9]*(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P
 
 
 def without_cut_row(file: BinaryIO, header: Header, line: int) -> tuple[BinaryIO, str]:
-    """Return a file from its position after a line on, without a last row that is cut, and a note on what is wrong.
+    """Return a file from its position after a line on, and a note on what is wrong, "" for nothing.
 
-    The row is left out if its last number stands out from those above, in its notation or its value. Without reason for
-    a note, the file is returned unchanged, at the same position, with an empty note.
+    A last row without an end is left out if its last number stands out from those above, in notation or value.
     """
-    begin = file.tell()
-    size = file.seek(0, io.SEEK_END)
-    start = max(begin, size - _TAIL)
-    file.seek(start)
+    begin, size = file.tell(), file.seek(0, io.SEEK_END)
+    file.seek(max(begin, size - _TAIL))
     *above, last = file.read().split(b"\n")
     file.seek(begin)
     if not last.strip(b",;\t \r") or last.endswith((b"\r", b'"')):
@@ -45,9 +42,8 @@ def without_cut_row(file: BinaryIO, header: Header, line: int) -> tuple[BinaryIO
     is_text = header.descriptions.get(header.names[-1], {}).get("kind") == "text"
     if is_text or len(cells) != len(header.names) or not _stands_out(cells[-1], ends):
         return file, note
-    return io.BytesIO(file.read(size - len(last) - begin)), (
-        f"{note} Its last number, {cells[-1]!r}, is unlike those above it, and the row is left out"
-    )
+    note += f" Its last number, {cells[-1]!r}, is unlike those above it, and the row is left out"
+    return io.BytesIO(file.read(size - len(last) - begin)), note
 
 
 def _stands_out(text: str, above: Sequence[str]) -> bool:

@@ -18,7 +18,7 @@ from tactile_bayes.record.schema import Kind
 from tactile_bayes.record.spelling import look_alikes, plain_number
 from tactile_bayes.record.table import Source
 
-_CHUNK = 1 << 16  # bytes that become columns at once; larger ones take longer, as cells do not stay in the cache
+_ROWS = 500  # number of rows that become columns at once; more take longer, as cells do not stay in the cache
 
 
 @dataclass
@@ -48,38 +48,32 @@ def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str,
     Columns without a known kind are integers, else numbers (empty cells are NaN), else text.
     """
     begin = file.tell()
-    most = 1 + sum(block.count(b"\n") + block.count(b"\r") for block in iter(lambda: file.read(_CHUNK), b""))
+    most = 1 + sum(block.count(b"\n") + block.count(b"\r") for block in iter(lambda: file.read(1 << 16), b""))
     while True:
         file.seek(begin)
-        with suppress(_WrongGuessError):
-            return _read_once(_chunks(file), layout, most, source)
+        text = io.TextIOWrapper(file, "utf-8", "surrogateescape", newline="")
+        try:
+            return _read_once(text, layout, most, source)
+        except _WrongGuessError:
+            continue
+        finally:
+            text.detach()
 
 
 def _read_once(
-    chunks: Iterator[bytes], layout: Layout, most: int, source: Source
+    text: Iterator[str], layout: Layout, most: int, source: Source
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
     columns = {name: _Values(most) for name in layout.names}
     lines = _Values(most)
     lines.append(np.empty(0, np.int64))
-    above = layout.line
-    for chunk in chunks:
-        cells, here, above = _read_cells(chunk, chunks, layout, above, source)
-        lines.append(here)
-        for name, values in cells.items():
-            columns[name].append(values)
+    order = sorted(layout.names, key=lambda name: name not in layout.meant)  # these show the decimal separator
+    for rows, begins in _pieces(text, layout, source):
+        lines.append(np.array(begins, dtype=np.int64))
+        here = Source(source.name, begins, aliases=source.aliases)
+        texts = dict(zip(layout.names, zip(*rows, strict=True), strict=True))
+        for name in order:
+            columns[name].append(_column_values(name, texts[name], layout, here))
     return {name: columns.pop(name).joined() for name in layout.names}, lines.joined()
-
-
-def _chunks(file: BinaryIO) -> Iterator[bytes]:
-    """Yield the rest of a file in pieces that end with a line, except the last."""
-    rest = b""
-    while block := file.read(_CHUNK):
-        end = block.rfind(b"\n") + 1
-        if end:
-            yield rest + block[:end]
-        rest = block[end:] if end else rest + block
-    if rest:
-        yield rest
 
 
 class _Values:
@@ -112,23 +106,12 @@ class _Values:
         return self._numbers
 
 
-def _read_cells(
-    chunk: bytes, chunks: Iterator[bytes], layout: Layout, above: int, source: Source
-) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64], int]:
-    """Read the columns of a chunk, the lines of its samples, and its last line; an error states the position."""
-    lines: list[str] = []
-
-    def fed() -> Iterator[str]:
-        piece = chunk
-        while piece:  # more than one if a cell in quotation marks continues beyond the end of a piece
-            lines.extend(_text_lines(piece, above + len(lines), source))
-            yield from lines[reader.line_num :]
-            piece = next(chunks, b"")
-
+def _pieces(text: Iterator[str], layout: Layout, source: Source) -> Iterator[tuple[list[list[str]], list[int]]]:
+    """Yield the cells of some rows after the others, and their first lines."""
     rows: list[list[str]] = []
     begins: list[int] = []
-    reader = csv.reader(fed(), delimiter=layout.delimiter)
-    begin, width = above + 1, len(layout.names)
+    reader = csv.reader(_lines(text, layout.line, source), delimiter=layout.delimiter)
+    begin, width = layout.line + 1, len(layout.names)
     try:
         for row in reader:
             if len(row) == width:
@@ -138,30 +121,29 @@ def _read_cells(
                 what = f"there are {len(row)} cells in {width} columns ({', '.join(map(str.strip, layout.names))})"
                 way = "" if layout.delimiter == "," else " or a comma, but none between thousands"
                 raise source.row_error(begin, f"{what}: write one per column, with a point in decimals{way}")
-            begin = above + 1 + reader.line_num
-            if reader.line_num == len(lines):
-                break
+            begin = layout.line + 1 + reader.line_num
+            if len(rows) == _ROWS:
+                yield rows, begins
+                rows, begins = [], []
     except csv.Error as error:
         what = f"the line cannot be read ({error}): correct it; "
         raise source.row_error(begin, f"{what}a quotation mark that is not closed takes in what follows") from error
-    here = Source(source.name, begins, aliases=source.aliases)
-    texts = dict(zip(layout.names, zip(*rows, strict=True) if rows else [()] * width, strict=True))
-    order = sorted(layout.names, key=lambda name: name not in layout.meant)  # these show the decimal separator
-    columns = {name: _column_values(name, texts[name], layout, here) for name in order}
-    return columns, np.array(begins, dtype=np.int64), begin - 1
+    if rows:
+        yield rows, begins
 
 
-def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
-    try:
-        text = chunk.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = above + 1 + chunk.count(b"\n", 0, error.start)
-        raise source.row_error(line, not_utf8(error)) from error
-    if "\0" in text:
-        begin = text.index("\0")
-        is_lost = not text[begin:].strip("\0\r\n")
-        raise source.row_error(above + 1 + text.count("\n", 0, begin), CUT_BY_NUL if is_lost else WITH_NUL)
-    return io.StringIO(text, newline="").readlines()
+def _lines(text: Iterator[str], above: int, source: Source) -> Iterator[str]:
+    """Yield the lines of a text, and refuse bytes that are none."""
+    for number, line in enumerate(text, start=above + 1):
+        if not line.isascii():
+            try:
+                line.encode("utf-8", "surrogateescape").decode("utf-8")
+            except UnicodeDecodeError as error:
+                raise source.row_error(number, not_utf8(error)) from error
+        if "\0" in line:
+            rest = line.partition("\0")[2] + next(text, "")
+            raise source.row_error(number, WITH_NUL if rest.strip("\0\r\n") else CUT_BY_NUL)
+        yield line
 
 
 def _column_values(name: str, texts: Sequence[str], layout: Layout, source: Source) -> NDArray[Any]:

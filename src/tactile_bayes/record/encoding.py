@@ -38,10 +38,7 @@ def refuse_other_kinds(start: bytes, source: Source) -> None:
 
 
 def in_utf8(file: BinaryIO) -> BinaryIO:
-    """Return the file, or a copy in UTF-8 if it is text in Windows-1252, as programs on Windows write it.
-
-    A file in UTF-8 with damaged bytes stays as it is, to be refused at the first of them.
-    """
+    """Return the file, or a copy in UTF-8 if it is text in Windows-1252; damaged UTF-8 stays as it is."""
     decoder = codecs.getincrementaldecoder("utf-8")()
     try:
         for block in iter(lambda: file.read(_CHUNK), b""):
@@ -49,8 +46,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
         decoder.decode(b"", final=True)
     except UnicodeDecodeError:
         file.seek(0)
-        copy = _from_windows(file.read())
-        if copy is not None:
+        if (copy := _from_windows(file.read())) is not None:
             return io.BytesIO(copy)
     file.seek(0)
     return file

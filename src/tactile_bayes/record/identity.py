@@ -15,10 +15,7 @@ from tactile_bayes.record.validation import validate
 
 
 def record_hash(record: xr.Dataset) -> str:
-    """SHA-256 of names, values and units of the columns of `MEASURED`, their frame, and the rod.
-
-    It does not depend on the order of columns, or on other columns and attributes, and is the same in every file.
-    """
+    """SHA-256 of names, values and units of the columns of `MEASURED`, in any order, their frame, and the rod."""
     record = validate(record)
     digest = hashlib.sha256()
 

@@ -17,8 +17,8 @@ _DRIFT, _ONE_SIDED, _CREEP = 0.3, 0.5, 0.03
 def positions_of(travel: Floats) -> Index:
     """Return the position, counted from 0, at which each sample of a sweep was read; one a sample if none is shared.
 
-    The differences of neighbours are divided where two successive ones, by size, are furthest apart in ratio: larger
-    ones are steps if all of them are in the sense of the drive, and smaller ones noise if they hardly move it.
+    Differences of neighbours are divided where two successive ones, by size, are furthest apart in ratio, if the larger
+    ones may be steps in the sense of the drive, and the smaller ones noise.
     """
     steps = np.diff(travel) * (1.0 if travel[-1] >= travel[0] else -1.0)
     sizes = np.sort(np.abs(steps))
@@ -36,10 +36,7 @@ def positions_of(travel: Floats) -> Index:
 
 
 def end_of_rest(travel: Floats, begin: int, end: int) -> int:
-    """Return the end of a sweep of the samples from `begin` to `end`, with all readings at its last position.
-
-    Noise of the encoder puts the turning point of a drive that stops somewhere among them.
-    """
+    """Return the end of a sweep with all readings at its last position; noise puts the turning point among them."""
     positions = positions_of(travel[begin:end])
     means = means_of_positions(travel[begin:end], positions)
     if means.size == end - begin:

@@ -126,10 +126,7 @@ def base_of_sample(record: xr.Dataset) -> tuple[list[tuple[float, float]], Index
 
 
 def travels_of(record: xr.Dataset) -> Floats:
-    """Return how far along the drive of its sweep each sample is, shape (samples,).
-
-    That is the drive angle [rad], or where the base is carried, its way since the first sample of the sweep [length].
-    """
+    """Return the drive angle [rad], or the way of a base that is carried since its sweep began [length], by sample."""
     travels, sweep = record.drive_angle.values.astype(float), record.sweep.values
     for number in carried_sweeps(record):
         rows = np.flatnonzero(sweep == number)

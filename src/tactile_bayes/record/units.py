@@ -89,10 +89,7 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
 
 
 def in_units_of_record(table: Table, rod: Rod | None) -> Table:
-    """Convert every column that the schema knows, arrays of float64 in place, to the unit of the record, or refuse it.
-
-    The record is SI or dimensionless by its attribute `units`, else by the rod, else by units like newtons.
-    """
+    """Convert known columns, arrays of float64 in place, to units of the record: as stated, or else of the rod."""
     attrs: dict[str, Any] = dict(table.attrs)
     if "units" not in attrs and rod is None and any(_is_physical(*item) for item in table.columns.items()):
         attrs["units"] = "SI"

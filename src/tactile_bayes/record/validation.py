@@ -25,8 +25,8 @@ from tactile_bayes.record.table import Cells, Source, Table, table_of
 def validate(record: xr.Dataset) -> xr.Dataset:
     """Validate and complete a record, or raise an error that says what is wrong, where, and what to do.
 
-    Encoders are noisy, so a sweep runs against its direction only if every step of its drive angle does, or if
-    the least-squares trend does by more than six of its own standard errors.
+    As encoders are noisy, a sweep runs against its direction only if every step of its drive angle does, or its
+    least-squares trend by more than six standard errors.
     """
     source = Source()
     if not isinstance(record, xr.Dataset):
