@@ -268,11 +268,11 @@ def _flaw_of(distribution: Distribution) -> str:
     return ""
 
 
-def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
+def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose: str = "") -> None:
     """Refuse distributions by names that are no parameters."""
     unknown = sorted(set(given) - set(names))
     if unknown:
-        raise ParameterError(f"{', '.join(unknown)} is no parameter{whose}: there are {', '.join(names)}{more}")
+        raise ParameterError(f"{', '.join(unknown)} is no parameter{whose}: there are {', '.join(names)}")
 
 
 def numbers_of(distribution: Any) -> dict[str, Any]:
