@@ -131,7 +131,8 @@ def distribution_of_table(
 def _of_kind(kind: DistributionKind, name: str, given: Any, number: Callable[[Any], float | None]) -> Distribution:
     numbers = [number(each) for each in (given if isinstance(given, list | tuple) else [given])]
     if len(numbers) != kind.size or not all(each is not None and math.isfinite(each) for each in numbers):
-        raise refused(name, given, f"give {'a finite number' if kind.size == 1 else f'a list of {kind.size} numbers'}")
+        wanted = "a finite number" if kind.size == 1 else f"a list of {kind.size} finite numbers"
+        raise refused(name, given, f"give {wanted}")
     if not kind.is_possible(*numbers):
         raise refused(name, given, kind.rule)
     return kind.frozen(*numbers)
