@@ -128,7 +128,7 @@ def ours(walk: Walk) -> Sampler:
         settings = tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS, max_steps=steps_for(evaluations), min_ess=1e9)
         names = [f"p{i}" for i in range(start.shape[-1])]
         draws = sample(target, walk.start, names=names, seed=1, settings=settings, coordinates=walk.coordinates)
-        kept = np.swapaxes(draws.by_walker(), 1, 2)
+        kept = draws.samples.reshape(len(draws.samples), draws.walkers, draws.steps_kept, -1).swapaxes(1, 2)
         return np.concatenate([np.full_like(kept, np.nan), kept], axis=1)  # it keeps the second half alone
 
     return draw

@@ -222,7 +222,7 @@ def _walk(joint: JointModel, experiment: PosteriorExperiment, seed: np.random.Se
         seed=seed,
         settings=experiment.settings,
     )
-    return Walk(start, coordinates.with_proposal(refined(target, proposal, rng)))
+    return Walk(start, replace(coordinates, proposal=refined(target, proposal, rng)))
 
 
 def _ratios(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:

@@ -133,9 +133,9 @@ def infer_contour(
     >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
-    settings = settings_of(settings)
-    experiment = Experiment(measured, rig_of(rig), family, settings.events)
-    return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
+    settings, seed = settings_of(settings), seed_sequence(rng)
+    problem = contour_problem(Experiment(measured, rig_of(rig), family, settings.events))
+    return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree
 
 
 def calibrate_rig(
@@ -199,31 +199,15 @@ def calibrate_rig(
     >>> list(calibrate_rig(measured, contour=pin, rig=rig, rng=1, settings=quick).calibration.priors)
     ['rigidity_scale']
     """
-    settings, rig = settings_of(settings), rig_of(rig)
+    settings, rig, seed = settings_of(settings), rig_of(rig), seed_sequence(rng)
     experiment = Experiment(records, rig, events=settings.events, gauge=Gauge(contour))
     if not experiment.unknowns.names:
         raise ParameterError("nothing of the rig is unknown: say that one of its parameters is, like rigidity_scale")
-    found = rig_prior(_posterior_of(experiment, rng, settings, checkpoint, progress, keep))
+    problem = contour_problem(experiment)
+    drawn = sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep)
+    found = rig_prior(drawn.tree)
     left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
     return replace(rig, unknown=left, calibration=found)
-
-
-def _posterior_of(
-    experiment: Experiment,
-    rng: Rng,
-    settings: SamplerSettings,
-    checkpoint: str | os.PathLike[str] | None,
-    progress: Callable[[Progress], object] | None,
-    keep: Callable[[xr.DataTree], object] | None,
-) -> xr.DataTree:
-    """Return the posterior of an experiment; arguments are checked and used as in `infer_contour`."""
-    if checkpoint is not None:
-        check_path("checkpoint", checkpoint, "give the path of a folder, or None")
-    check_function("progress", progress)
-    check_function("keep", keep)
-    seed = seed_sequence(rng)
-    problem = contour_problem(experiment)
-    return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree
 
 
 class Sampled(NamedTuple):
@@ -245,7 +229,11 @@ def sampled(
     walk: Walk | None = None,
     with_prior: bool = True,
 ) -> Sampled:
-    """Return the posterior of a problem."""
+    """Return the posterior of a problem; arguments are as in `infer_contour`."""
+    if checkpoint is not None:
+        check_path("checkpoint", checkpoint, "give the path of a folder, or None")
+    check_function("progress", progress)
+    check_function("keep", keep)
     seeds = spawn(seed, 4)
     deadline = Deadline.after(settings.max_seconds)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws
@@ -96,23 +92,14 @@ def _events(model: ContourModel, draws: Draws, kept: Index) -> xr.Dataset:
         events_of(model.likelihood, model.contours(points[block]), model.rig(points[block]), exact=False)
         for block in blocks(len(points), 1, _PATHS)
     ]
-    shape = (len(draws.samples), kept.size, -1)
-    return _labelled_events(
-        model,
-        {name: np.concatenate([event[name] for event in found]).reshape(shape) for name in found[0]},
-        {"chain": np.arange(shape[0]), "draw": kept},
-    )
-
-
-def _labelled_events(model: ContourModel, events: Mapping[str, Floats], coords: Mapping[str, Any]) -> xr.Dataset:
-    units = model.measured.attrs["units"]
-    variables = {}
-    for name, values in events.items():
+    chains, units, variables = len(draws.samples), model.measured.attrs["units"], {}
+    for name in found[0]:
+        values = np.concatenate([event[name] for event in found]).reshape(chains, kept.size, -1)
         what = name.removeprefix("first_").removeprefix("snap_off_")
         column = COLUMNS["base_x" if what == "travel" else what]
         variables[name] = (("chain", "draw", "segment"), values, {"units": column.unit_in(units)})
     sides = np.where(model.likelihood.segments.backward, "backward", "forward")
-    return xr.Dataset(variables, coords={**coords, "segment": sides})
+    return xr.Dataset(variables, coords={"chain": np.arange(chains), "draw": kept, "segment": sides})
 
 
 def prior_draws(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> xr.Dataset:
@@ -138,10 +125,6 @@ def unit_of(model: ContourModel, name: str) -> str:
     elif row is not None:
         unit = row.unit
     else:
-        unit = {0: "1", 1: "m", -1: "1/m"}[_whole(model.family).length_powers.get(name, 0)]
+        family = model.family.whole if isinstance(model.family, PartlyKnown) else model.family
+        unit = {0: "1", 1: "m", -1: "1/m"}[family.length_powers.get(name, 0)]
     return unit if unit == "rad" or model.measured.attrs["units"] != "dimensionless" else "1"
-
-
-def _whole(family: ContourFamily) -> ContourFamily:
-    """Return the family with its known parameters."""
-    return family.whole if isinstance(family, PartlyKnown) else family

@@ -26,9 +26,6 @@ _ROUNDS = 10  # of expectation and maximisation
 _PRIOR_POINTS, _PRIOR_WIDTH = 5.0, 0.3
 
 
-# ---- weights
-
-
 def normalised(logs: Floats) -> Floats:
     """Return weights of sum one from their logarithms, shape (n,)."""
     with np.errstate(invalid="ignore"):  # −inf less the largest remains −inf
@@ -47,9 +44,6 @@ def flattened(logs: Floats, least: float) -> Floats:
     while effective_number(weights := normalised(power * logs)) < least:
         power *= 0.8
     return weights
-
-
-# ---- densities
 
 
 @dataclass(frozen=True, eq=False)

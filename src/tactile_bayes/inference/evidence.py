@@ -51,10 +51,8 @@ def bridge_evidence(
     for n effective draws of p and m of q (Meng & Wong 1996, Statistica Sinica 6, 831; Gronau et al. 2017, doi
     10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the other, and vice versa: a
     comparison with the fitted draws is biased (Overstall & Forster 2010, doi 10.1016/j.csda.2010.03.008). The error has
-    both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with autocorrelation; only what does
-    not depend on the fit averages out. In tens of dimensions it is up to a quarter too large. q is normal in scores
-    that are piecewise linear in one parameter, for hard bounds and skewness, or in one of the uncorrelated axes nearest
-    to the parameters. Neither t distributions nor a symmetrised density (Warp-III) gained anything.
+    both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with autocorrelation; in tens of
+    dimensions it is up to a quarter too large. Neither t distributions nor Warp-III gained anything.
     """
     count = proposals // 2
     _refuse_few(draws)
@@ -86,7 +84,7 @@ def _fitted(points: Floats) -> _ScoreFit:
     same = np.flatnonzero(deviation <= 0.0)
     if same.size:
         raise InferenceError(f"parameter {same[0]} is the same in a half of the draws: give draws that vary")
-    sizes, directions = np.linalg.eigh(_covariance(points / deviation))
+    sizes, directions = np.linalg.eigh(np.atleast_2d(np.cov((points / deviation).T)))
     try:
         if not sizes[0] > _FLAT * sizes[-1]:
             raise np.linalg.LinAlgError
@@ -99,29 +97,25 @@ def _fitted(points: Floats) -> _ScoreFit:
     return max(fits, key=lambda fit: fit.log_density(points).mean())
 
 
-def _covariance(points: Floats) -> Floats:
-    return np.atleast_2d(np.cov(points.T))
-
-
 class _ScoreFit:
-    """A normal distribution of normal scores along axes."""
+    """A normal distribution of normal scores along the columns of `axes`, (d, d), fitted to points, (n, d).
+
+    Scores are piecewise linear in the place along an axis, for hard bounds and skewness.
+    """
 
     def __init__(self, points: Floats, axes: Floats) -> None:
-        """Fit to points, shape (n, d), along the columns of `axes`, shape (d, d)."""
         self._centre, self._axes, self._back = points.mean(axis=0), axes, np.linalg.inv(axes)
         self._knots = np.quantile(self._along(points), ndtr(_KNOTS), axis=0).T
         if not np.all(np.diff(self._knots, axis=1) > 0.0):
             raise InferenceError("a half of the draws has too few different points: give more draws")
         self._slopes = (_KNOTS[1] - _KNOTS[0]) / np.diff(self._knots, axis=1)
         scores, _ = self._scores(points)
-        self._normal = Proposal(
-            scores.mean(axis=0), np.asarray(np.linalg.cholesky(_covariance(scores))), freedom=np.inf
-        )
+        root = np.linalg.cholesky(np.atleast_2d(np.cov(scores.T)))
+        self._normal = Proposal(scores.mean(axis=0), np.asarray(root), freedom=np.inf)
         self._constant = self._normal.constant + float(np.linalg.slogdet(axes).logabsdet)
 
     def _along(self, points: Floats) -> Floats:
-        along: Floats = (points - self._centre) @ self._axes
-        return along
+        return np.asarray((points - self._centre) @ self._axes)
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Draw points, shape (count, d)."""
@@ -130,8 +124,7 @@ class _ScoreFit:
         for j, (knots, slopes) in enumerate(zip(self._knots, self._slopes, strict=True)):
             i = _piece(_KNOTS, scores[:, j])
             along[:, j] = knots[i] + (scores[:, j] - _KNOTS[i]) / slopes[i]
-        points: Floats = self._centre + along @ self._back
-        return points
+        return np.asarray(self._centre + along @ self._back)
 
     def log_density(self, points: Floats) -> Floats:
         """Return the log-density at points, shape (n, d), as an array of shape (n,)."""
@@ -151,8 +144,7 @@ class _ScoreFit:
 
 def _piece(knots: Floats, values: Floats) -> Index:
     """Return the index of the piece between knots that contains each value; the outer pieces are unbounded."""
-    piece: Index = np.clip(np.searchsorted(knots, values) - 1, 0, knots.size - 2)
-    return piece
+    return np.asarray(np.clip(np.searchsorted(knots, values) - 1, 0, knots.size - 2))
 
 
 class _Bridge(NamedTuple):

@@ -110,9 +110,12 @@ class Experiment:
         """Attributes of a posterior: record, assumptions and priors."""
         attrs, cell = self.record.attrs, self.noise.cell
         known = {**self.own_family.known, **self.unknowns.known}
+        of_contour = {"family": self.own_family.name, "family_parameters": self.own_family.text}
+        if self.gauge is not None:
+            of_contour = {"gauge": repr(self.gauge.known)}
         return {
             "data_sha256": attrs.get(_WHOLE) or record_hash(self.record),
-            **self._of_contour,
+            **of_contour,
             "rig": replace(self.rig, load_cell=self.rig.load_cell or LoadCell.from_record(self.record)).text,
             "friction": self.unknowns.friction,
             "known": json.dumps(known),
@@ -127,12 +130,6 @@ class Experiment:
             "approximations": "; ".join(cell.approximations),
             **{f"load_cell_{name}": v for name, v in cell.entries().items() if name not in self.noise.inferred},
         }
-
-    @property
-    def _of_contour(self) -> dict[str, str]:
-        if self.gauge is not None:
-            return {"gauge": repr(self.gauge.known)}
-        return {"family": self.own_family.name, "family_parameters": self.own_family.text}
 
     @property
     def assumptions(self) -> dict[str, str]:

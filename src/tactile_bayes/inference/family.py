@@ -174,6 +174,8 @@ class Gauge(ContourFamily):
     """Family whose only contour is a known one, in the record's unit of length."""
 
     known: Contour
+    name = GAUGE
+    table = MappingProxyType[str, FamilyParameter]({})
 
     def __post_init__(self) -> None:
         correction = "give the contour of the gauge, like Circle(r=0.01, q=0.03)"
@@ -182,14 +184,6 @@ class Gauge(ContourFamily):
             raise ParameterError(
                 f"contour is {self.known!r}: {correction}, one contour of a family (not from_points or from_function)"
             )
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        return GAUGE
-
-    @property
-    def table(self) -> Mapping[str, FamilyParameter]:  # type: ignore[override]
-        return {}
 
     @property
     def is_always_clear(self) -> bool:

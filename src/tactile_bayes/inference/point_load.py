@@ -38,11 +38,6 @@ _VAGUE = 100.0  # prior sd of a sensor coefficient, in full scales of the readin
 _SETTINGS = SamplerSettings(walkers=64)  # most of an evaluation does not depend on their number
 
 
-def _reach(axial: Floats, lateral: Floats) -> float:
-    """Return the distance of the farthest probe point from the origin."""
-    return float(np.hypot(axial, lateral).max())
-
-
 def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -> dict[str, Distribution]:
     """Return the default priors, from the probe points and the sensor's full scale.
 
@@ -58,7 +53,7 @@ def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -
     ``noise_sd``         log-uniform, 1e-6 to 1 full scale      only that there is some noise is known
     ===================  =====================================  ====================================================
     """
-    scale = _reach(np.asarray(axial, dtype=float), np.asarray(lateral, dtype=float)) / 4.0
+    scale = float(np.hypot(axial, lateral).max()) / 4.0
     return {
         "clamp_axial": stats.norm(0.0, scale),
         "clamp_lateral": stats.norm(0.0, scale),
@@ -91,15 +86,11 @@ def _split_priors(
     """Return priors of unknown parameters, and values of known ones."""
     check_mapping("priors", priors, "give distributions, or numbers, by name")
     refuse_unknown_names(priors or {}, tuple(defaults))
-    unknown: dict[str, Distribution] = {}
-    known: dict[str, float] = {}
-    for name, prior in {**defaults, **(priors or {})}.items():
-        number = as_number(prior)
-        if number is not None:
-            known[name] = number
-        else:
-            check_distribution(name, prior)
-            unknown[name] = prior  # type: ignore[assignment]
+    given: dict[str, Any] = {**defaults, **(priors or {})}
+    known = {name: number for name, prior in given.items() if (number := as_number(prior)) is not None}
+    unknown = {name: prior for name, prior in given.items() if name not in known}
+    for name, prior in unknown.items():
+        check_distribution(name, prior)
     check_number("compliance", known.get("compliance", 0.0), "it cannot be negative", least=0.0)
     check_positive("noise_sd", known.get("noise_sd", 1.0), "give the scatter of repeated readings, or a prior")
     if not unknown:
@@ -183,7 +174,7 @@ def infer_point_load(
     check_function("progress", progress)
     settings = settings or _SETTINGS
     unknown, known = _split_priors(priors, default_priors(axial, lateral, full_scale=full_scale))
-    unit = 3.0 / _reach(axial, lateral)
+    unit = 3.0 / float(np.hypot(axial, lateral).max())
     model = PointLoadModel(axial, lateral, reading, unit, _VAGUE * full_scale, unknown, known, small_deflection)
 
     seed = seed_sequence(rng)
@@ -255,12 +246,10 @@ def _tree(model: PointLoadModel, draws: Draws, rng: np.random.Generator) -> xr.D
     return tree
 
 
-def _sum_of_squares(residuals: Floats) -> Floats:
-    return np.asarray((residuals**2).sum(axis=-1))
-
-
-def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = _sum_of_squares) -> float:
-    """Return the posterior predictive p-value of a discrepancy of residuals over the noise.
+def predictive_p_value(
+    tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = lambda residuals: np.sum(residuals**2, axis=-1)
+) -> float:
+    """Return the posterior predictive p-value of a discrepancy, by default the sum of squares of residuals over noise.
 
     If the model holds, it is closer to one half than a uniform number (Gelman, Meng & Stern 1996, Statistica Sinica 6,
     733).

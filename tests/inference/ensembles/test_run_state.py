@@ -22,7 +22,7 @@ def as_block(samples):
 def second_half(state):
     """Samples and log-probability at a diagnosis, whether walkers moved, and the thinning."""
     state = state.halved()
-    return state.half.samples, state.half.values, state.moved, state.every
+    return state.half.samples, state.half.values, state.half.moved[:, 1:], state.every
 
 
 def appended(samples, ends, coordinates):

@@ -17,7 +17,7 @@ from tactile_bayes.inference.contour_evidence import contour_evidence
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.streams import particles
-from tactile_bayes.inference.streams.e_value import surprise_after
+from tactile_bayes.inference.streams.stream_state import surprise_after
 from tactile_bayes.rig import Rig
 
 STATED = Rig(load_cell=CELL, unknown="nothing")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -21,7 +23,6 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
     contact_states,
 )
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
 
@@ -36,36 +37,33 @@ class Evaluated(NamedTuple):
     contact: Floats  # point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n)
 
 
+@dataclass(frozen=True, eq=False)
 class ContactDensity:
     """Log-density of contacts, given one sample each.
 
     The prior is a density over contact point and slope angle; on a phase's sheet of (force, ψ1, s1, drive angle) it is
-    multiplied by the volume that the sheet's coordinates span. `base` are the pivots, (n, 2), in the record's unit of
-    length. A sample touches with the angle of friction times its `sense`, which lies between −1 and 1 if it sticks.
+    multiplied by the volume that the sheet's coordinates span. A sample touches with the angle of friction times its
+    `sense`, which lies between −1 and 1 if it sticks.
     """
 
-    def __init__(
-        self,
-        samples: Samples,
-        readings: LoneSamples,
-        base: Floats,
-        *,
-        turning: bool,
-        friction: float,
-        prior: ContactPrior,
-    ) -> None:
-        if not (callable(prior) or (isinstance(prior, str) and prior in ("flat", "polar"))):
+    samples: Samples
+    readings: LoneSamples
+    base: Floats  # pivots [length], shape (n, 2)
+    turning: bool  # whether the load cell turns with the drive
+    friction: float
+    prior: ContactPrior
+
+    def __post_init__(self) -> None:
+        if not (callable(self.prior) or (isinstance(self.prior, str) and self.prior in ("flat", "polar"))):
             raise ParameterError(
-                f"prior is {shown(prior)}: choose 'flat' or 'polar', or give a function of contact_x, contact_y and "
-                "slope_angle that returns a log-density"
+                f"prior is {shown(self.prior)}: choose 'flat' or 'polar', or give a function of contact_x, contact_y "
+                "and slope_angle that returns a log-density"
             )
-        self.samples = samples
-        self.delta = samples.friction_angles(friction)
-        self.base = base
-        self._readings = readings
-        self._turning = turning
-        self._friction = friction
-        self._prior = prior
+
+    @cached_property
+    def delta(self) -> Floats:
+        """Angles of friction, shape (n,)."""
+        return self.samples.friction_angles(self.friction)
 
     @property
     def has_free_angle(self) -> bool:
@@ -81,8 +79,8 @@ class ContactDensity:
 
     def take(self, where: Index) -> ContactDensity:
         """Return the density of some of the samples."""
-        some, readings, base = self.samples.take(where), self._readings.take(where), self.base[where]
-        return ContactDensity(some, readings, base, turning=self._turning, friction=self._friction, prior=self._prior)
+        samples, readings = self.samples.take(where), self.readings.take(where)
+        return replace(self, samples=samples, readings=readings, base=self.base[where])
 
     def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
         """Evaluate contacts from coordinates, shape (..., n, 4), and phase, shape (..., n); −inf if impossible."""
@@ -93,17 +91,17 @@ class ContactDensity:
         moment, force_x, force_y = rod.loads.reshape(3, *shape)
         loads = np.stack([side * moment, side * force_x, force_y], axis=-1)
         angle = coordinates[..., DRIVE_ANGLE]
-        if self._turning:
+        if self.turning:
             in_lab_frame = np.where(side < 0.0, np.pi - angle, angle)
             loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], in_lab_frame)
         alpha, arclength = rod.place[2:]
         with np.errstate(divide="ignore", invalid="ignore"):
             volume = np.log(np.where(tip, rod.volume_tip, rod.volume_tangential))
-            facing = np.abs(alpha - self._surface.half_angle) < 0.5 * np.pi
+            facing = np.abs(alpha - self.samples.rod.surface.half_angle) < 0.5 * np.pi
             possible = ((arclength <= 1.0) & facing & np.isfinite(volume)).reshape(shape)
             turn = coordinates[..., PSI1] + self.delta
             possible &= (turn >= 0.0) & (turn <= np.pi)
-            density = volume.reshape(shape) + self._readings.log_density(loads) + self._log_prior(rod.place, shape)
+            density = volume.reshape(shape) + self.readings.log_density(loads) + self._log_prior(rod.place, shape)
             if self.has_free_angle:
                 off = (angle - reading.drive_angle) / reading.angle_deviation
                 density -= 0.5 * off**2 + np.log(np.sqrt(2.0 * np.pi) * reading.angle_deviation)
@@ -124,22 +122,18 @@ class ContactDensity:
     def to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""
         length, side = self.samples.rod.length_unit, self.samples.side
-        x, y, alpha, arclength = self._surface.on_object(contact)
+        x, y, alpha, arclength = self.samples.rod.surface.on_object(contact)
         return np.stack(
             [self.base[:, 0] + side * x * length, self.base[:, 1] + y * length, side * alpha, arclength * length]
         )
 
-    @property
-    def _surface(self) -> Surface:
-        return self.samples.rod.surface
-
     def _log_prior(self, contact: Floats, shape: tuple[int, ...]) -> Floats | float:
-        if self._prior == "flat":
+        if self.prior == "flat":
             return 0.0
         contact = contact.reshape(4, *shape)
-        if not callable(self._prior):
+        if not callable(self.prior):
             return np.asarray(-np.log(np.hypot(contact[0], contact[1])))
-        values = np.asarray(self._prior(*self.to_lab_frame(contact)[:3]), dtype=float)
+        values = np.asarray(self.prior(*self.to_lab_frame(contact)[:3]), dtype=float)
         if values.shape != shape:
             raise ParameterError(
                 f"the prior gave an array of shape {values.shape} for arguments of shape {shape}: it has to work "

@@ -154,7 +154,9 @@ def infer_contacts(
             draw_contacts(density, draws, for_draws, progress), rows, log_prior, np.random.default_rng(for_ways)
         )
         tree = xr.DataTree.from_dict(_groups(measured, density, found))
-    chance = _misfit_probability(measured, cell, friction)
+    chance = float("nan")  # without variances
+    if cell.degrees_of_freedom > 2.0:
+        chance = float(contacts_of(Corrected(measured, cell, friction), "constrained").attrs["misfit_probability"])
     tree.attrs = {
         "inference_library": "tactile-bayes",
         "inference_library_version": version("tactile-bayes"),
@@ -172,13 +174,6 @@ def infer_contacts(
         "approximations": "; ".join(_approximations(cell)),
     }
     return tree
-
-
-def _misfit_probability(measured: xr.Dataset, cell: LoadCell, friction: float) -> float:
-    """Return the probability of a larger misfit of all samples, from `reconstruct`; NaN without variances."""
-    if cell.degrees_of_freedom <= 2.0:
-        return float("nan")
-    return float(contacts_of(Corrected(measured, cell, friction), "constrained").attrs["misfit_probability"])
 
 
 def density_of(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.densities import LogProbability, Mixture
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Coordinates:
     """A change of variables between coordinates and as many parameters; here they are the same."""
 
@@ -29,10 +29,6 @@ class Coordinates:
         """Return the coordinates of points, shape (..., parameters)."""
         return points
 
-    def with_proposal(self, proposal: Mixture) -> Self:
-        """Return the same coordinates with another proposal."""
-        return replace(self, proposal=proposal)  # type: ignore[type-var]
-
 
 @dataclass(frozen=True, eq=False)
 class Logarithms(Coordinates):
@@ -42,7 +38,6 @@ class Logarithms(Coordinates):
     """
 
     positive: Flags
-    proposal: Mixture | None = None
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         points = coordinates.copy()

@@ -11,7 +11,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import FLANKS, sides_of
 from tactile_bayes.contours.family import VERTEX
 from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
-from tactile_bayes.inference.densities import Mixture
 from tactile_bayes.numerics.differences import central_slopes
 
 # Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
@@ -96,7 +95,6 @@ class FlankCoordinates(Coordinates):
     x: float  # at which the coordinates are taken [length]
     side: float  # 1 if the vertex lies at smaller x, −1 if it lies at larger x
     columns: tuple[int, ...]  # of the flank's sizes, q and x_c among the parameters
-    proposal: Mixture | None = None
 
     @staticmethod
     def describe(family: str) -> bool:

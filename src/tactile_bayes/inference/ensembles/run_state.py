@@ -145,8 +145,3 @@ class RunState:
             values = self.half.values[chain, 0, others] + self.coordinates.parameters(there)[1]
             last.samples[chain, -1, missing], last.log_probability[chain, -1, missing] = there, values
         return replace(self, last=last)
-
-    @property
-    def moved(self) -> Flags:
-        """True if a walker moved in a step, for all of the second half except the first; (chain, step, walker)."""
-        return self.half.moved[:, 1:]

@@ -67,11 +67,6 @@ class Draws:
         """Return the indices of at most so many draws of each chain, evenly spread."""
         return evenly_spread(self.samples.shape[1], most)
 
-    def by_walker(self) -> Floats:
-        """Return the samples as (chain, walker, step, parameter)."""
-        chains, _, parameters = self.samples.shape
-        return self.samples.reshape(chains, self.walkers, self.steps_kept, parameters)
-
 
 _DRAWS_PER_WALKER = 5  # effective ones, at least: the discarded half then exceeds five autocorrelation times
 _CONVERGED = "converged"
@@ -186,7 +181,9 @@ class _Run:
             self.target.evaluations = points[..., 0].size * (1 + self.steps)
             ended_at = self.steps if stored.is_end else 0
         else:
-            self.state = RunState.begin(self.coordinates, _first_block(points, self.density, seed))
+            values = np.array([self.density(ensemble) for ensemble in points])
+            randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
+            self.state = RunState.begin(self.coordinates, Block(points[:, None], values[:, None], randoms))
         # A run that was killed before a diagnosis is diagnosed where it is.
         self.due = ended_at or next_diagnosis(self.steps - 1, self.settings.block_steps)
 
@@ -227,7 +224,8 @@ class _Run:
         state, found, settings, names = self.state, self.diagnosis, self.settings, tuple(self.target.names)
         assert found is not None
         chains, _, walkers, _ = state.last.samples.shape
-        converged, half, moved = self.ending == _CONVERGED, state.half, state.moved
+        converged, half = self.ending == _CONVERGED, state.half
+        moved = half.moved[:, 1:]  # not in the first step of those kept, before which nothing is known
         stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
         lost = int(np.count_nonzero(lost_walkers(half.values)))
         modes = () if converged else modes_of(half.samples, half.values, names)
@@ -263,10 +261,3 @@ class _Run:
             stuck=stuck,
             modes=modes,
         )
-
-
-def _first_block(points: Floats, density: LogProbability, seed: Seed) -> Block:
-    """Return the starting points as a block of one step."""
-    values = np.array([density(ensemble) for ensemble in points])
-    randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
-    return Block(points[:, None], values[:, None], randoms)

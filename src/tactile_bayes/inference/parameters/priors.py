@@ -92,7 +92,8 @@ def _matching(name: str) -> tuple[float, float]:
             n: (_log_normal(prior, width) if family.length_powers[n] else prior).ppf(u)  # type: ignore[attr-defined]
             for (n, prior), u in zip(priors.items(), uniform, strict=True)
         }
-        return mean_log_radius(_built(family, values))
+        inside = {n: np.clip(value, *family.bounds[n]) for n, value in values.items()}
+        return mean_log_radius(family.build(*(inside.get(n, np.zeros(_DRAWS)) for n in family.parameters)))
 
     def too_wide(width: float) -> float:
         ends = np.quantile(drawn(width), stats.norm.cdf([-1.0, 1.0]))
@@ -100,13 +101,6 @@ def _matching(name: str) -> tuple[float, float]:
 
     width = float(brentq(too_wide, _NARROWEST, _WIDEST, xtol=1e-3))
     return float(_MEDIAN / np.exp(np.median(drawn(width)))), width
-
-
-def _built(family: ContourFamily, values: Mapping[str, Floats]) -> Contour:
-    """Return contours with the vertex at the origin; parameters out of bounds are moved to the nearest bound."""
-    zeros = np.zeros(_DRAWS)
-    inside = {name: np.clip(value, *family.bounds[name]) for name, value in values.items()}
-    return family.build(*(inside.get(name, zeros) for name in family.parameters))
 
 
 def _is_log_normal(prior: Distribution) -> bool:

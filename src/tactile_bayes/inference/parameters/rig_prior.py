@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,9 @@ from tactile_bayes.rig.parameters import MAY_VANISH
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.tasks.documents import read_json
 
-# Parameters, by parts of their names, that belong to one record (zeros, pivots and gauge) or to rod and object
+# Parameters, by parts of their names, that belong to one record (zeros, misfit, pivots, gauge) or to rod and object
 # (friction).
-_PASSING = ("bias", "drift", "friction", "base", "gauge")
+_PASSING = ("bias", "drift", "discrepancy", "friction", "base", "gauge")
 _PROBABILITIES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])  # at which quantiles of draws and density are compared
 # Beginnings of the attributes that must agree: the rig's parameters are deviations from what they state.
 _SENSES = (
@@ -36,11 +36,6 @@ _SENSES = (
 _NOISES = ("load_cell_drive_angle_noise", "load_cell_drive_angle_resolution")
 
 
-def _lasting(unknowns: Collection[str]) -> tuple[str, ...]:
-    """Return the names of the parameters that a rig keeps from one record to the next."""
-    return tuple(name for name in unknowns if not any(part in _PASSING for part in name.split("_")))
-
-
 def rig_prior(rig: xr.DataTree) -> RigPrior:
     """Return a density fitted to the posterior of a rig."""
     if not isinstance(rig, xr.DataTree) or "gauge" not in rig.attrs:
@@ -48,8 +43,8 @@ def rig_prior(rig: xr.DataTree) -> RigPrior:
     if not rig.attrs.get("converged"):
         raise InferenceError(f"the posterior of the rig has not converged ({rig.attrs.get('message')}): infer it again")
     draws = posterior_draws(rig)
-    names = _lasting(read_json(rig.attrs["nuisances"], "nuisances"))
-    names = tuple(name for name in names if name in draws and "discrepancy" not in name)
+    inferred = [name for name in read_json(rig.attrs["nuisances"], "nuisances") if name in draws]
+    names = tuple(name for name in inferred if not set(_PASSING) & set(name.split("_")))
     if not names:
         raise InferenceError("no unknown of the rig lasts beyond its record: say that one is, like rigidity_scale")
     points = np.stack([draws[name].values.ravel() for name in names], axis=1)

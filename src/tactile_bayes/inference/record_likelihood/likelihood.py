@@ -140,10 +140,6 @@ class RecordLikelihood:
             return NO_TABLES
         return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction, rig.length)
 
-    def _bases(self, rig: RigValues) -> Floats:
-        """Return the pivots, shape (segments, n, 2)."""
-        return np.asarray(self.segments.bases[:, None] + rig.base_shifts[:, self.segments.pivots].swapaxes(0, 1))
-
     def travels(self, drive_angles: Floats, rig: RigValues) -> Floats:
         """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L]."""
         sign = self.segments.signs_of_samples
@@ -225,7 +221,8 @@ class RecordLikelihood:
         return shapes_of(contours, low.min(axis=0), high.max(axis=0))
 
     def _sweeps(self, rig: RigValues) -> Sweeps:
-        count, segments, bases, rod = rig.friction.size, len(self.segments), self._bases(rig), self.rod
+        count, segments, rod = rig.friction.size, len(self.segments), self.rod
+        bases = self.segments.bases[:, None] + rig.base_shifts[:, self.segments.pivots].swapaxes(0, 1)
         curvature = rod.rest_curvature / rod.curvature_unit if self._profile(rig) is None else 0.0
         return Sweeps(
             contour=np.tile(np.arange(count), segments),

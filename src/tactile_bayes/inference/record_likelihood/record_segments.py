@@ -43,9 +43,7 @@ class RecordSegments:
         self.drive_angles = angle
         self.of_sample: Index = which  # segment of each sample, shape (samples,)
         self.samples: list[Index] = [np.flatnonzero(which == k) for k in range(len(kinds))]  # of each segment
-        self.pivots: Index = pivot[
-            [own[0] for own in self.samples]
-        ]  # numbers of the pivots, in the order of the record
+        self.pivots: Index = pivot[[own[0] for own in self.samples]]  # their numbers, in the order of the record
         self.bases = kinds[:, :2]  # pivots, or where drives begin [length], shape (segments, 2)
         self.backward = kinds[:, 2] > 0.0  # True for contact on the side of a backward sweep
         self.signs = np.where(self.backward, -1.0, 1.0)

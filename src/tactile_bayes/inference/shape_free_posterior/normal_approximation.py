@@ -14,8 +14,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
 from tactile_bayes.inference.shape_free_posterior.columns import joined, white_scales
-from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, linearised
-from tactile_bayes.inference.shape_free_posterior.observer import Observer
+from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, Observer, linearised
 
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
 

@@ -181,10 +181,6 @@ class _Search:
             late[allowed] = self.brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
-    def events_missed(self, coordinates: Floats) -> Floats:
-        """Return the residuals of events, shape (n, events)."""
-        return self.residuals(coordinates)[:, self.measured.size :]
-
     def beside(self, starts: Sequence[Mapping[str, float]]) -> Iterator[Floats]:
         """Yield coordinates of the contour fitted to Step 2's contacts, without and with the rig's medians, and of
         starts, where medians stand for what they do not name."""
@@ -203,9 +199,13 @@ class _Search:
             yield fitted
         parts = [self.drawn[block] for block in blocks(len(self.drawn), self.measured.size)]
         costs = np.concatenate([np.sum(np.minimum(np.abs(self.residuals(part)), 30.0), axis=1) for part in parts])
+
+        def missed(coordinates: Floats) -> Floats:
+            return self.residuals(coordinates)[:, self.measured.size :]
+
         for place in self.drawn[np.argsort(costs)[:_CANDIDATES]]:
             if self.brackets.low.size and not self.deadline.has_passed:
-                yield descend(self.events_missed, place, self.middle, self.spread, deadline=self.deadline).point
+                yield descend(missed, place, self.middle, self.spread, deadline=self.deadline).point
             else:
                 yield place
 
@@ -246,8 +246,8 @@ class _Search:
         covariance[:size, :size] = found.covariance * np.outer(narrow, narrow)
         sizes = np.linalg.slogdet(found.covariance).logabsdet - 2.0 * np.log(self.spread).sum()
         log_evidence = float(0.5 * sizes - found.cost)
-        beyond = self._beyond(found)
-        return ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, beyond, log_evidence)
+        whole = np.append(point, noise)
+        return ContourOptimum(whole, covariance, found.cost, found.fits, self._beyond(found), log_evidence)
 
     def _beyond(self, found: Optimum) -> str:
         """Return the parameters that fit the record far better beyond the ends of their priors, as text."""

@@ -19,9 +19,8 @@ from tactile_bayes.inference.densities import Mixture
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.importance import refined
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.shape_free_posterior.observer import Observer
-from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
-from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
+from tactile_bayes.inference.shape_free_posterior.observations import Observer
+from tactile_bayes.inference.shape_free_posterior.whitening import Whitening, whitening_at
 from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optimum_of
 from tactile_bayes.inference.starts.modes import Modes
@@ -162,7 +161,7 @@ class _Start(NamedTuple):
             point = modes[0].optimum.point
             best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
             raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
-        coordinates = common.with_proposal(proposal)
+        coordinates = replace(common, proposal=proposal)
         log_evidence = float(logsumexp([part.log_mass for part in proposal.parts]))
         first = modes[0].optimum
         return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, _is_hopeless(model, first))

@@ -10,9 +10,9 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.coordinates.base import in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
-from tactile_bayes.inference.ensembles.moves import Moves, moves_in
+from tactile_bayes.inference.ensembles.moves import moves_in
 from tactile_bayes.inference.ensembles.run_state import Block, make_block
-from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
+from tactile_bayes.inference.ensembles.walkers import first_random_state
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
 _STEPS = (40, 80, 160, 320)  # of each pilot run
@@ -37,7 +37,10 @@ def standardise(
         if deadline.has_passed:
             break
         density = in_coordinates(log_probability, best)
-        block = _pilot(density, moves_in(best), points, steps, random, deadline)
+        first = Block(points[None, None], density(points)[None, None], (random,))
+        block = make_block(density, moves_in(best), first, steps, deadline)
+        if not block.whole:
+            raise KeyboardInterrupt
         (random,), points = block.random_states, block.samples[0, -1].copy()
         late = np.swapaxes(block.samples[0, block.steps // 2 :], 0, 1)
         normal, gain = _cross_validated(late[..., columns])
@@ -96,14 +99,3 @@ def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
         gains[number] = float(np.mean([fit.gain(other) for fit, other in zip(fits, halves[::-1], strict=True)]))
     best = max(gains, key=gains.__getitem__)
     return _Normal.fitted(np.concatenate(halves), best), gains[best]
-
-
-def _pilot(
-    density: LogProbability, moves: Moves, start: Floats, steps: int, random: RandomState, deadline: Deadline
-) -> Block:
-    """Return the steps of one ensemble; an interrupt is raised."""
-    first = Block(start[None, None], density(start)[None, None], (random,))
-    block = make_block(density, moves, first, steps, deadline)
-    if not block.whole:
-        raise KeyboardInterrupt
-    return block

@@ -16,8 +16,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import in_coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal, effective_number, normalised
 from tactile_bayes.inference.ensembles.moves import FittedMove, step_ensembles
-from tactile_bayes.inference.streams.e_value import WIDER
-from tactile_bayes.inference.streams.stream_state import StreamState
+from tactile_bayes.inference.streams.stream_state import WIDER, StreamState
 from tactile_bayes.numerics.selection import resampled
 
 # Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28

@@ -26,10 +26,9 @@ from tactile_bayes.inference.ensembles.checkpoint import changes
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
-from tactile_bayes.inference.streams.e_value import surprise_after
 from tactile_bayes.inference.streams.growing_record import continued
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, Particles
-from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
+from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, surprise_after, tree_of
 from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import validate

@@ -1,4 +1,4 @@
-"""The state of a stream, and the file from which a stream resumes after it was killed at any moment."""
+"""The state of a stream, its e-value, and the file from which a stream resumes after it was killed at any moment."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.special import logsumexp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, RecordError
@@ -18,6 +19,7 @@ from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.tasks.documents import read_json
 
+WIDER = (1.5, 3.0, 6.0)  # factors on the noise of the alternatives with which the e-value compares the model
 _KIND = "stream of tactile-bayes"
 _FORMAT = 2
 _HOW = "begin a new stream, or put a copy of the file back"
@@ -44,6 +46,18 @@ class StreamState:
     updates: int
     evaluations: int
     seconds: float
+
+
+def surprise_after(old: StreamState | None, log_ratios: Floats) -> tuple[Floats, float]:
+    """Return the products of ratios after a block, and the logarithm of the largest e-value so far.
+
+    That the model is wrong from the k-th block on has the prior weight 1/(k(k + 1)); blocks to come have no ratio yet.
+    """
+    blocks = 1 if old is None else old.updates + 2
+    before = np.full(len(WIDER), -np.inf) if old is None else old.log_products
+    products = np.logaddexp(before, -np.log(blocks * (blocks + 1.0))) + log_ratios
+    now = float(np.logaddexp(logsumexp(products) - np.log(len(WIDER)), -np.log(blocks + 1.0)))
+    return products, now if old is None else float(np.fmax(now, old.surprise))
 
 
 _ARRAYS = {
