@@ -451,3 +451,23 @@ def test_the_length_of_a_rig_is_that_of_a_rod_of_the_same_proportions(rig):
     events = events_of(found, contours, of_found)
     for name, expected in events_of(known, contours, of_known).items():
         np.testing.assert_allclose(events[name], expected, atol=1e-9, err_msg=name)
+
+
+def test_events_lie_where_most_samples_say():
+    """Also where some of them are taken for what they are not."""
+    record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
+    likelihood = RecordLikelihood(record, CELL)
+    loaded = (record.force_y != 0.0).values
+    events = likelihood.segments.event_samples(loaded)
+    for row, direction in zip(events, ("forward", "backward"), strict=True):
+        own = np.flatnonzero((record.direction == direction).values)
+        inside = own[loaded[own]]
+        assert row.tolist() == [inside[0] - 1, inside[0], inside[-1], inside[-1] + 1]
+    mistaken = loaded.copy()
+    mistaken[[events[0, 3] + 3, events[1, 0] - 2, events[0, 1] + 4]] ^= True
+    np.testing.assert_array_equal(likelihood.segments.event_samples(mistaken), events)
+    angles = likelihood.segments.event_angles(loaded)
+    contours = Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0]))
+    snap_offs = likelihood.predict_with_events(contours)[2][0, :, 1]
+    assert np.all((angles[:, 2] < snap_offs) & (snap_offs < angles[:, 3]))
+    assert (likelihood.segments.event_samples(np.zeros(loaded.size, dtype=bool)) == -1).all()

@@ -1,4 +1,4 @@
-"""Coordinates of a flank: a bijection of the contour's parameters, and its Jacobian determinant."""
+"""Coordinates of parameters: bijections, with the determinant of their Jacobian."""
 
 import numpy as np
 import pytest
@@ -40,6 +40,14 @@ def points_of(family, side, count=50):
         first = distance / (0.05 + 0.9 * rng.random(count))
     sizes = [first] if len(POSITIVE[family]) == 4 else [first, second]
     return np.stack([*sizes, rng.normal(size=count), PLACE - side * distance, size], axis=1)
+
+
+def test_logarithms_lead_back():
+    coordinates = Logarithms(np.array([True, False, True]))
+    points = np.exp(np.random.default_rng(2).normal(size=(5, 3)))
+    there, growth = coordinates.parameters(coordinates.of(points))
+    np.testing.assert_allclose(there, points, rtol=1e-14)
+    np.testing.assert_allclose(growth, np.log(points[:, 0] * points[:, 2]), rtol=1e-12)
 
 
 @FLANKS
