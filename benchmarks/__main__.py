@@ -154,7 +154,7 @@ def posteriors() -> Row:
             one = density.take(np.array([i]))
 
             def log_density(points: Floats, one: ContactDensity = one) -> Floats:
-                return one.at(*one.unfold(points[:, None])).log_density[:, 0]
+                return one.log_density(*one.unfold(points[:, None]))[:, 0]
 
             seed = np.random.SeedSequence(i)
             sample(log_density, starts[:, :, i], names=("way", "force"), seed=seed, settings=settings)

@@ -233,35 +233,6 @@ def posterior_at_exact_angle(sample: Sample, *, cells=100) -> Summary:
     return _by_phase(sample, one_sum, angle_noise=2e-3)
 
 
-def posterior_by_roots(sample: Sample, *, cells=50) -> Summary:
-    """The same over the plane of contact points: slopes that give the drive angle, each with density 1 / |∂φ0/∂α|.
-
-    Roots are looked for between neighbours of a list of slopes at which the drive angle passes the one that was read.
-    """
-
-    def one_sum(rng, centre, root):
-        plane, deviation = np.linalg.cholesky((root @ root.T)[:2, :2]), np.sqrt((root[2] ** 2).sum())
-        slope = centre[2] + deviation * np.linspace(-8.0, 8.0, 32)
-        slope = slope[np.abs(slope) < 0.5 * np.pi]
-        polar = centre[:2] + _jittered(rng, (cells, cells)) @ plane.T
-        points, volume = contact_points(np.column_stack([polar, np.zeros(len(polar))]))
-        off = sample.wrench(points[:, :1], points[:, 1:2], slope).drive_angle - sample.angle
-        where, k = np.nonzero(off[:, :-1] * off[:, 1:] <= 0.0)  # the drive angle is continuous between the phases
-        x, y = points[where, :2].T
-        low, high, below = slope[k], slope[k + 1], off[where, k]
-        for _ in range(40):
-            half = 0.5 * (low + high)
-            left = below * (sample.wrench(x, y, half).drive_angle - sample.angle) > 0.0
-            low, high = np.where(left, half, low), np.where(left, high, half)
-        found = sample.wrench(x, y, low)
-        logs = sample.log_loads(found, sample.angle) - np.log(np.abs(found.by_slope))
-        logs += volume[where] + np.log(np.diag(plane)).sum()
-        logs[~np.isfinite(logs)] = -np.inf
-        return sample.surface(np.stack([x, y, low], axis=-1)), logs, found.phase
-
-    return _by_phase(sample, one_sum, angle_noise=2e-3)
-
-
 def _summary(parts) -> Summary:
     top = max(logs.max() for _, logs, _ in parts)
     parts = [(points, np.exp(logs - top), lies.astype(float)) for points, logs, lies in parts]

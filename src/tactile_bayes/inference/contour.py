@@ -16,7 +16,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
+from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem, identity_of
 from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, settings_of
@@ -110,17 +110,16 @@ def infer_contour(
     of the pivot sideways and in height, uniformly. Log-normal, with a standard deviation of 1 of the logarithm, are
     parabola's a, around 1/L; circle's r and ellipse's semi-axes a (sideways) and b, around L/2; and w of a power law,
     (y − q)/w = (|x − x_c|/w)ⁿ, around L. Its n − 1 is log-normal around 1 (0.7), n from 1.1 to 50. Shape-free contours
-    are smooth: the logarithm of their radius of curvature is a random function of the slope angle with Matérn's
-    covariance, ν = 5/2. r, its geometric mean, is log-normal like a circle's; amplitude, its standard deviation, around
-    0.7 (0.6); length_scale [rad] around 0.7 (0.4), from 0.15 to 4; z_1, z_2 …, its directions, are standard normal.
-    noise_scale is log-normal around 1 (0.5); unknown noises are log-uniform from 1e-6 to 10, in EI/L and EI/L². Those
-    of the rig are in the table of `tactile-bayes rig --parameters`. In addition, contours out of reach are excluded,
-    those that the rod would still cut after snap-off, and those that a rod curved toward the object would touch twice.
+    are smooth: the logarithm of their radius of curvature is a random function of the slope angle (Matérn, ν = 5/2). r,
+    its geometric mean, is log-normal like a circle's; amplitude, its standard deviation, around 0.7 (0.6); length_scale
+    [rad] around 0.7 (0.4), from 0.15 to 4; z_1, z_2 …, its directions, are standard normal. noise_scale is log-normal
+    around 1 (0.5); unknown noises are log-uniform from 1e-6 to 10, in EI/L and EI/L². Those of the rig are in the table
+    of `tactile-bayes rig --parameters`. In addition, contours are excluded that the rod would still cut after snap-off,
+    or that a rod curved toward the object would touch twice.
 
     A discrepancy is a Gaussian process over the drive, ν = 3/2, of each channel and sweep segment, in proportion to the
     largest load and zero out of contact. It is refused beside outliers, correlated noise, errors of the encoder, and
-    readings at the end of the range. It widens bands, may explain what is smooth, like a small dent of the contour, and
-    does not correct a wrong property of the rig that another contour explains as well.
+    readings at the end of the range.
 
     Examples
     --------
@@ -257,7 +256,7 @@ def sampled(
             progress=progress,
             checkpoint=checkpoint,
             coordinates=walk.coordinates,
-            identity=None if checkpoint is None else problem.identity,
+            identity=None if checkpoint is None else identity_of(problem.about),
         )
         tree = xr.DataTree.from_dict(drawn_groups(model, draws))
         tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)

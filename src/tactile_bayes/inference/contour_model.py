@@ -51,11 +51,8 @@ class ContourModel:
         noise: Noise,
         priors: Mapping[str, Distribution],
     ) -> None:
-        self.measured = measured
-        self.family = family
-        self.unknowns = unknowns
-        self.noise = noise
-        self.priors = priors
+        self.measured, self.family, self.priors = measured, family, priors
+        self.unknowns, self.noise = unknowns, noise
         self.forward_parameters = (*family.parameters, *unknowns.names)
         self.names = (*self.forward_parameters, *noise.names)
         bounds = [*family.bounds.values(), *(unknowns.bounds(name) for name in unknowns.names)]
@@ -81,7 +78,9 @@ class ContourModel:
                 "drive_angle_noise or drive_angle_resolution together with a discrepancy have no closed form: leave "
                 "one of the two out (relative_noise of the load cell can stand for small errors of the encoder)"
             )
-        self.found = self._zero_load()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DriftWarning)
+            self.found = zero_load(measured)
         self.zero, noise_found = self._unloaded()
         is_white = (noise_found > 0.0) & (not unknowns.memory)  # else readings that decay count as unloaded
         rough = np.where(is_white, noise_found, self._rough_noise())
@@ -272,7 +271,7 @@ class ContourModel:
         return points
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
-        """Draw from the prior of contours within reach. Returns points, shape (count, d)."""
+        """Return draws from the prior of contours within reach, (count, d) or fewer, and the share within reach."""
         found, drawn = [np.empty((0, len(self.names)))], 0
         most = max(_MOST_TRIALS * count, _FEWEST_TRIALS)
         while (had := sum(map(len, found))) < count and drawn < most:
@@ -300,11 +299,6 @@ class ContourModel:
         if not len(points):
             return points
         return points[self.likelihood.usable(self.contours(points), self.rig(points))]
-
-    def _zero_load(self) -> xr.Dataset:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DriftWarning)
-            return zero_load(self.measured)
 
     def _unloaded(self) -> tuple[Floats, Floats]:
         """Return mean and standard deviation of each channel's unloaded samples, shape (3,); NaN if they are few."""

@@ -36,14 +36,8 @@ class ContourProblem(NamedTuple):
     model: ContourModel
     about: Mapping[str, Any]  # attributes of the posterior
     loaded: Flags  # True for samples with a load that noise does not explain, shape (samples,)
-
     others: tuple[ContourProblem, ...] = ()  # problems with other sides of contact, if these are doubtful
     log_prior_odds: float = 0.0  # of the sides of contact over those that the directions state
-
-    @property
-    def identity(self) -> dict[str, str]:
-        """Entries that a resumed run must have in common with the interrupted one."""
-        return identity_of(self.about)
 
     def without(self, samples: Flags) -> ContourModel:
         """Return the model of the record without some samples, a mask of shape (samples,)."""
@@ -76,13 +70,10 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
     stated = {sweep: side_of(record, sweep) for sweep in doubtful}
     every = []
     for turned in product((False, True), repeat=len(doubtful)):
-        sides = {
-            sweep: OTHER_SIDE[stated[sweep]] if turn else stated[sweep]
-            for sweep, turn in zip(doubtful, turned, strict=True)
-        }
-        odds = -_BELIEVED * sum(turned)
-        other = replace(experiment, record=with_sides(record, sides))
-        every.append(_of_sides(other)._replace(log_prior_odds=odds))
+        pairs = zip(stated.items(), turned, strict=True)
+        sides = {sweep: OTHER_SIDE[side] if turn else side for (sweep, side), turn in pairs}
+        other = _of_sides(replace(experiment, record=with_sides(record, sides)))
+        every.append(other._replace(log_prior_odds=-_BELIEVED * sum(turned)))
     return every[0]._replace(others=tuple(every[1:]))
 
 

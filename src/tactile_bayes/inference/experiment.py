@@ -109,6 +109,7 @@ class Experiment:
     def about(self) -> dict[str, Any]:
         """Attributes of a posterior: record, assumptions and priors."""
         attrs, cell = self.record.attrs, self.noise.cell
+        sheet = {name: v for name, v in cell.entries().items() if name not in ("frame", *self.noise.names)}
         known = {**self.own_family.known, **self.unknowns.known}
         of_contour = {"family": self.own_family.name, "family_parameters": self.own_family.text}
         if self.gauge is not None:
@@ -128,7 +129,7 @@ class Experiment:
             **rod_attributes(rod_of(self.record)),
             **({} if self.unknowns.joint is None else self.unknowns.joint.entries),
             "approximations": "; ".join(cell.approximations),
-            **{f"load_cell_{name}": v for name, v in cell.entries().items() if name not in self.noise.inferred},
+            **{f"load_cell_{name}": value for name, value in sheet.items()},
         }
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
@@ -261,8 +262,6 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     >>> float(to_arviz(xr.DataTree.from_dict({"posterior": draws})).posterior["q"].mean())
     0.5
     """
-    import warnings
-
     check_kind("posterior", posterior, xr.DataTree, "give a result of infer_contour or infer_contacts")
     if "posterior" in posterior.children:
         posterior_draws(posterior)

@@ -13,7 +13,6 @@ from helpers.contact_posteriors import (
     measured,
     posterior,
     posterior_at_exact_angle,
-    posterior_by_roots,
     weighed_moments,
 )
 from helpers.refusals import refused
@@ -55,15 +54,6 @@ def test_with_friction_too():
     assert_agrees(density_of(measured(), CELL, 141, friction=0.3), exact)
 
 
-@pytest.mark.slow
-def test_two_sums_over_contacts_of_a_known_drive_angle_are_one():
-    """One turns contacts until the drive angle is right, one looks for slopes: 5 standard errors of both."""
-    sample = Sample(measured("exact angle"), 39, EXACT_ANGLE)
-    one, other = posterior_at_exact_angle(sample), posterior_by_roots(sample, cells=30)
-    error = np.hypot(np.hypot(one.error, other.error), 1e-4 * one.spread + 1e-12)
-    np.testing.assert_array_less(np.abs(one.numbers - other.numbers) / error, 5.0)
-
-
 def random_coordinates(rng, count):
     """Force, ψ1, arc length and drive angle on both sheets, and the phases."""
     phase = rng.choice([TIP, TANGENTIAL], count).astype(np.int8)
@@ -79,8 +69,7 @@ def test_the_density_is_likelihood_times_prior_times_volume(i):
     rng, record = np.random.default_rng(4), measured()
     density, sample = density_of(record, CELL, i), Sample(record, i, CELL)
     z, phase = random_coordinates(rng, 200)
-    found = density.at(z[:, None, :], phase[:, None])
-    logs, places = found.log_density[:, 0], density.to_lab_frame(found.contact)[:3, :, 0].T
+    logs, places = density.log_density(z[:, None], phase[:, None])[:, 0], density.contacts(z[:, None])[:3, :, 0].T
     expected, phases = sample.log_likelihood(places)
     use = np.isfinite(logs) & (logs > -1e4)
     assert use.sum() > 40
@@ -88,8 +77,8 @@ def test_the_density_is_likelihood_times_prior_times_volume(i):
     assert (phases[use] == phase[use]).all()
     columns = []
     for step in range(4):
-        moved = (density.at((z + move * np.eye(4)[step])[:, None, :], phase[:, None]) for move in (1e-6, -1e-6))
-        ahead, behind = (density.to_lab_frame(each.contact)[:3, :, 0].T for each in moved)
+        moved = (density.contacts((z + move * np.eye(4)[step])[:, None]) for move in (1e-6, -1e-6))
+        ahead, behind = (each[:3, :, 0].T for each in moved)
         columns.append((ahead - behind) / 2e-6)
     slopes = np.stack(columns, axis=-1)
     free = np.where((phase == TIP)[:, None], [[0, 1, 3]], [[0, 2, 3]])
@@ -106,19 +95,7 @@ def test_what_no_rod_can_do_has_no_density():
     z[3, 1] = 1.6  # pushed back along itself
     z[4, 2] = 1.1  # beyond the tip
     z[5, 3] = 3.4  # on a slope that looks down
-    assert np.isfinite(density.at(z[:, None], phase[:, None]).log_density[:, 0]).tolist() == [True] + [False] * 5
-
-
-def test_a_part_of_the_samples_has_the_same_density():
-    rng = np.random.default_rng(5)
-    which = np.array([21, 61, 101])
-    density = density_of(measured("turning"), CELL, which)
-    z, phase = random_coordinates(rng, 12)
-    z, phase = z.reshape(4, 3, 4), phase.reshape(4, 3)
-    whole = density.at(z, phase).log_density
-    for k in range(3):
-        part = density.take(np.array([k])).at(z[:, [k]], phase[:, [k]]).log_density
-        np.testing.assert_allclose(part[:, 0], whole[:, k], rtol=1e-13)
+    assert np.isfinite(density.log_density(z[:, None], phase[:, None])[:, 0]).tolist() == [True] + [False] * 5
 
 
 @pytest.mark.slow

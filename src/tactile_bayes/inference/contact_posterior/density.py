@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,6 @@ from tactile_bayes.record import turned
 
 LogPrior = Callable[[Floats, Floats, Floats], Floats]
 ContactPrior = Literal["flat", "polar"] | LogPrior
-
-
-class Evaluated(NamedTuple):
-    """Contacts with the logarithm of their posterior density."""
-
-    log_density: Floats  # density over force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)
-    contact: Floats  # point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +75,11 @@ class ContactDensity:
         samples, readings = self.samples.take(where), self.readings.take(where)
         return replace(self, samples=samples, readings=readings, base=self.base[where])
 
-    def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
-        """Evaluate contacts from coordinates, shape (..., n, 4), and phase, shape (..., n); −inf if impossible."""
+    def log_density(self, coordinates: Floats, phase: NDArray[np.int8]) -> Floats:
+        """Return the log-density over force, ψ1 (tip) or arc length (tangential), and drive angle; −inf if impossible.
+
+        Shapes: coordinates (..., n, 4), phase and result (..., n).
+        """
         shape = coordinates.shape[:-1]
         tip = phase.reshape(-1) == TIP
         rod = self._states(coordinates)
@@ -105,13 +101,12 @@ class ContactDensity:
             if self.has_free_angle:
                 off = (angle - reading.drive_angle) / reading.angle_deviation
                 density -= 0.5 * off**2 + np.log(np.sqrt(2.0 * np.pi) * reading.angle_deviation)
-        density = np.where(possible & ~np.isnan(density), density, -np.inf)
-        return Evaluated(density, rod.place.reshape(4, *shape))
+        return np.where(possible & ~np.isnan(density), density, -np.inf)
 
     def contacts(self, coordinates: Floats) -> Floats:
-        """Return contacts from coordinates, shape (..., n, 4), in the form of `to_lab_frame`."""
+        """Return contacts from coordinates, shape (..., n, 4), in the form of `_to_lab_frame`."""
         contact = self._states(coordinates).place
-        return self.to_lab_frame(contact.reshape(4, *coordinates.shape[:-1]))
+        return self._to_lab_frame(contact.reshape(4, *coordinates.shape[:-1]))
 
     def _states(self, coordinates: Floats) -> ContactStates:
         """Return contacts from coordinates, shape (..., n, 4), one after the other."""
@@ -119,7 +114,7 @@ class ContactDensity:
         each, delta = (np.broadcast_to(of, coordinates.shape[:-1]).ravel() for of in (rods.curvature, self.delta))
         return contact_states(coordinates.reshape(-1, 4), delta, rods._replace(curvature=each))
 
-    def to_lab_frame(self, contact: Floats) -> Floats:
+    def _to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""
         length, side = self.samples.rod.length_unit, self.samples.side
         x, y, alpha, arclength = self.samples.rod.surface.on_object(contact)
@@ -133,7 +128,7 @@ class ContactDensity:
         contact = contact.reshape(4, *shape)
         if not callable(self.prior):
             return np.asarray(-np.log(np.hypot(contact[0], contact[1])))
-        values = np.asarray(self.prior(*self.to_lab_frame(contact)[:3]), dtype=float)
+        values = np.asarray(self.prior(*self._to_lab_frame(contact)[:3]), dtype=float)
         if values.shape != shape:
             raise ParameterError(
                 f"the prior gave an array of shape {values.shape} for arguments of shape {shape}: it has to work "

@@ -153,7 +153,7 @@ def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequ
 
 def _weighed(density: ContactDensity, points: Floats, log_proposal: Floats) -> ContactWeights:
     """Return points, (draws, n, 2 or 3), from proposals of a log-density, (draws, n), with their importance weights."""
-    log_weight = density.at(*density.unfold(points)).log_density - log_proposal
+    log_weight = density.log_density(*density.unfold(points)) - log_proposal
     _, log_evidence = weighed(log_weight)
     lost = ~np.isfinite(log_evidence)
     log_weight[:, lost] = 0.0

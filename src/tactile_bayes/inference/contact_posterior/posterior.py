@@ -106,14 +106,8 @@ def infer_contacts(
     If the load is at least ten standard deviations of its noise, the posterior moves by less than a tenth of a standard
     deviation between them. Near first contact the choice matters: contacts with loads near zero lie within a thin shell
     at the end of the rod's reach, to which a flat prior gives little mass, and the posterior of a weak contact shifts
-    inwards. Give your own density there if you know more.
-
-    tangential_probability is the posterior probability of each sample under that prior, not a frequency along a sweep:
-    if a rod dwells in tip contact, as it does along parabolas, most of the samples that leave the phase open are in
-    tip contact, whatever their probabilities. The regions of contact points hold nevertheless.
-
-    If the drive angle is exact, the posterior is a density on a surface, with the prior as the limit of small encoder
-    errors.
+    inwards. tangential_probability is that of each sample under the prior, not a frequency along a sweep. If the drive
+    angle is exact, the posterior is a density on a surface, with the prior as the limit of small encoder errors.
 
     Examples
     --------
@@ -205,15 +199,8 @@ def density_of(
     return density, rows, log_prior
 
 
-def _everywhere(values: Floats, loaded: Index, size: int) -> Floats:
-    """Return values of loaded samples, shape (..., n), at their places among all samples; NaN elsewhere."""
-    spread = np.full((*values.shape[:-1], size), np.nan)
-    spread[..., loaded] = values
-    return spread
-
-
 def _groups(measured: xr.Dataset, density: ContactDensity, found: MixedDraws) -> dict[str, xr.Dataset]:
-    size, points, units = measured.sizes["sample"], found.of_ways.points, measured.attrs["units"]
+    points, units = found.of_ways.points, measured.attrs["units"]
     coordinates, _ = density.unfold(points)
     columns = {
         name: (values, column_attributes(name, units))
@@ -222,21 +209,21 @@ def _groups(measured: xr.Dataset, density: ContactDensity, found: MixedDraws) ->
     if density.has_free_angle:
         angle = np.where(density.samples.side < 0.0, np.pi - coordinates[..., 3], coordinates[..., 3])
         columns["drive_angle"] = angle, {"units": "rad", "long_name": "drive angle"}
-    columns["tangential"] = points[..., 0] < 0.0, {"units": "1", "long_name": "whether the contact is tangential"}
-    dims, sample = ("chain", "draw", "sample"), {"sample": np.arange(size)}
-    coords = {"chain": np.arange(points.shape[0]), "draw": np.arange(points.shape[1]), **sample}
+    is_tangential = (points[..., 0] < 0.0).astype(float)
+    columns["tangential"] = is_tangential, {"units": "1", "long_name": "whether the contact is tangential"}
+    dims, every = ("chain", "draw", "sample"), {"sample": np.arange(measured.sizes["sample"])}
+    coords = {"chain": np.arange(points.shape[0]), "draw": np.arange(points.shape[1]), "sample": found.samples}
     variables = {
-        name: (dims, _everywhere(np.take_along_axis(values, found.picked, -1), found.samples, size), attrs)
-        for name, (values, attrs) in columns.items()
+        name: (dims, np.take_along_axis(values, found.picked, -1), attrs) for name, (values, attrs) in columns.items()
     }
     observed = [name for name in ("drive_angle", *CHANNELS) if name in measured]
-    numbers = {name: _everywhere(values, found.samples, size) for name, values in found.stats.items()}
-    numbers["converged"] = np.nan_to_num(numbers["converged"]).astype(np.int8)
+    stats = xr.Dataset({name: ("sample", values) for name, values in found.stats.items()}, {"sample": found.samples})
+    stats = stats.reindex(every)
     return {
-        "posterior": xr.Dataset(variables, coords=coords),
-        "observed_data": measured[observed].assign_coords(sample),
-        "constant_data": measured[list(_CONSTANT)].assign_coords(sample),
-        "sample_stats": xr.Dataset({name: ("sample", values) for name, values in numbers.items()}, sample),
+        "posterior": xr.Dataset(variables, coords=coords).reindex(every),
+        "observed_data": measured[observed].assign_coords(every),
+        "constant_data": measured[list(_CONSTANT)].assign_coords(every),
+        "sample_stats": stats.assign(converged=stats["converged"].fillna(0.0).astype(np.int8)),
     }
 
 

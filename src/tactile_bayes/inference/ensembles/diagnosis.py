@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import emcee
 import numpy as np
 from arviz_stats.base.array import array_stats
+from scipy.sparse.csgraph import connected_components
 
 from tactile_bayes.arrays import Flags, Floats
 
@@ -117,9 +118,10 @@ def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> 
     mean, deviation = samples.mean(axis=(1, 2)), samples.std(axis=(1, 2))  # (chain, parameter)
     larger = np.maximum(deviation[:, None], deviation)
     distance = np.abs(mean[:, None] - mean) / np.where(larger > 0.0, larger, np.inf)  # (chain, chain, parameter)
-    groups = _connected(distance.max(axis=-1) < _MIN_DISTANCE)
-    if len(groups) < 2:
+    count, group_of = connected_components(distance.max(axis=-1) < _MIN_DISTANCE)
+    if count < 2:
         return ()
+    groups = [tuple(np.flatnonzero(group_of == k).tolist()) for k in range(count)]
     clearest = np.argsort(-distance.max(axis=(0, 1)), kind="stable")
     separating = [i for i in clearest if distance[..., i].max() >= _MIN_DISTANCE]
     return tuple(
@@ -154,11 +156,3 @@ def _are_stationary(samples: Floats) -> bool:
     least = _MIN_DRAWS_PER_WALKER * samples.shape[2]
     each = [Diagnosis(ensemble[None]) for ensemble in samples]
     return all(bool(np.all(one.r_hat < _MAX_R_HAT) and np.all(one.ess_bulk >= least)) for one in each)
-
-
-def _connected(near: Flags) -> list[tuple[int, ...]]:
-    """Return the groups of ensembles that are near one another, directly or through others."""
-    reached = near.copy()
-    for k in range(len(near)):
-        reached |= np.outer(reached[:, k], reached[k])
-    return sorted({tuple(np.flatnonzero(row).tolist()) for row in reached})

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,31 +100,25 @@ def sample(
 ) -> Draws:
     """Draw from a posterior with independent ensembles of walkers, which propose from one another.
 
-    The ensembles run in step. After `block_steps` steps, and whenever their number has grown by a quarter, the second
-    half of the steps so far is diagnosed: rank-normalised R̂ across ensembles, each split in early and late steps, and
-    effective sample size in bulk and tails (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every
-    parameter satisfies the settings, the walkers have given five effective draws each on average, and none is lost
-    where nothing is probable. A few that are lost are taken back to where others of their ensemble were. `start`,
-    (ensembles, walkers, parameters), is in the coordinates; it should be wider than the posterior, or R̂ cannot
-    distinguish a part of it from the whole.
-
-    A KeyboardInterrupt after the first step ends the run with the draws so far. A run with a checkpoint may be killed
-    at any moment: called again it resumes from the stored state, and its draws are, bit by bit, those of an
-    uninterrupted run; one that has ended is not made again. `identity` states what determines the log-probability. Of
-    the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change from call to call.
+    After `block_steps` steps, and whenever their number has grown by a quarter, the second half of them is diagnosed
+    (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every parameter satisfies the settings, the walkers
+    have given five effective draws each on average, and none is lost where nothing is probable. `start`, (ensembles,
+    walkers, parameters), is in the coordinates; it should be wider than the posterior, or R̂ cannot distinguish a part
+    of it from the whole. A KeyboardInterrupt after the first step ends the run with the draws so far. With a checkpoint
+    a run that was killed resumes, bit by bit; `identity` states what determines the log-probability.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
     names, points = tuple(names), np.array(start, dtype=float)
     chains, walkers, _ = points.shape
     settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
-    coordinates = coordinates or Coordinates()
     with ExitStack() as stack:
         stored = None
         if checkpoint is not None:
             about = identity_of_run(identity, points, names, seed, settings)
             stored = stack.enter_context(open_checkpoint(checkpoint, about))
-        run = _Run(CheckedTarget(log_probability, names), coordinates, settings, stored, progress, began)
+        target = CheckedTarget(log_probability, names)
+        run = _Run(target, coordinates or Coordinates(), settings, stored, progress, began)
         run.begin(points, seed)
         while not run.has_ended:
             try:
@@ -137,28 +131,25 @@ def sample(
         return run.draws()
 
 
+@dataclass
 class _Run:
     """A run of ensembles: where it is, when it is diagnosed next, and why it has ended."""
 
-    state: RunState
+    target: CheckedTarget
+    coordinates: Coordinates
+    settings: SamplerSettings
+    stored: Checkpoint | None
+    progress: Callable[[Progress], object] | None
+    began: float
+    state: RunState = field(init=False)
     diagnosis: Diagnosis | None = None  # of the state as it is
     ending: str = ""
     is_late: bool = False
-    due: int  # number of steps of the next diagnosis
+    due: int = 0  # number of steps of the next diagnosis
 
-    def __init__(
-        self,
-        target: CheckedTarget,
-        coordinates: Coordinates,
-        settings: SamplerSettings,
-        stored: Checkpoint | None,
-        progress: Callable[[Progress], object] | None,
-        began: float,
-    ) -> None:
-        self.target, self.density = target, in_coordinates(target, coordinates)
-        self.coordinates, self.settings, self.stored, self.progress = coordinates, settings, stored, progress
-        self.began = began
-        self.deadline = NEVER if settings.max_seconds is None else Deadline(began + settings.max_seconds)
+    def __post_init__(self) -> None:
+        self.density, limit = in_coordinates(self.target, self.coordinates), self.settings.max_seconds
+        self.deadline = NEVER if limit is None else Deadline(self.began + limit)
 
     @property
     def steps(self) -> int:
@@ -231,9 +222,8 @@ class _Run:
         modes = () if converged else modes_of(half.samples, half.values, names)
         message = f"{self.ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {found.message(names)}"
         if not converged:
-            message += (
-                f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
-            )
+            criteria = f"R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
+            message += f"; criteria: {criteria}"
         if modes:
             message += f"; {modes_message(modes)}"
         of_walkers = f"of {chains * walkers} walkers"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,13 +33,13 @@ def generator_at(state: RandomState) -> np.random.RandomState:
     return random
 
 
+@dataclass
 class CheckedTarget:
     """The log-probability with its values checked and its evaluations counted."""
 
-    def __init__(self, log_probability: LogProbability, names: Sequence[str]) -> None:
-        self.log_probability = log_probability
-        self.names = names
-        self.evaluations = 0
+    log_probability: LogProbability
+    names: Sequence[str]
+    evaluations: int = 0
 
     def __call__(self, points: Floats) -> Floats:
         values = np.asarray(self.log_probability(points), dtype=float)

@@ -41,11 +41,6 @@ class Noise(NamedTuple):
         """The cell, if its noise is known up to a factor, or altogether; otherwise None."""
         return self.cell if self.of_white in (("noise_scale",), ()) else None
 
-    @property
-    def inferred(self) -> tuple[str, ...]:
-        """Entries of the cell that are inferred, and the frame, which is an attribute of its own."""
-        return ("frame", *self.names)
-
 
 def noise_of(measured: xr.Dataset, rig: Rig) -> Noise:
     """Return the noise parameters of a record: a factor on the stated noise, or the scales if none is stated."""

@@ -67,7 +67,8 @@ def mean_log_radius(contours: Contour) -> Floats:
 
 def widened(priors: Mapping[str, Distribution], factor: float) -> dict[str, Distribution]:
     """Return priors whose log-normal ones have the same median and a standard deviation multiplied by a factor."""
-    return {name: _log_normal(prior, factor) if _is_log_normal(prior) else prior for name, prior in priors.items()}
+    kinds = {name: getattr(getattr(prior, "dist", None), "name", "") for name, prior in priors.items()}
+    return {n: _log_normal(prior, factor) if kinds[n] == "lognorm" else prior for n, prior in priors.items()}
 
 
 def _of_flank(name: str, length: float) -> dict[str, Distribution]:
@@ -101,10 +102,6 @@ def _matching(name: str) -> tuple[float, float]:
 
     width = float(brentq(too_wide, _NARROWEST, _WIDEST, xtol=1e-3))
     return float(_MEDIAN / np.exp(np.median(drawn(width)))), width
-
-
-def _is_log_normal(prior: Distribution) -> bool:
-    return getattr(getattr(prior, "dist", None), "name", "") == "lognorm"
 
 
 def _log_normal(prior: Distribution, width: float, stretch: float = 1.0) -> Distribution:

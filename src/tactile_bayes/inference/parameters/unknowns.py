@@ -23,7 +23,7 @@ from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
 from tactile_bayes.rig.parameters import BASE, COMPLIANCES, GROUPS, PARAMETERS, SENSOR, parameter_named
 from tactile_bayes.rig.stated import Stated, memory_in, sensor_values, stated_values, unit_of
-from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
+from tactile_bayes.rig.unknown import of_modes, of_pivots
 
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
@@ -205,7 +205,9 @@ def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool =
     of_joint = {} if joint is None else dict(joint.priors)
     said = {name: v for name, v in rig.said.items() if name not in (*of_joint, *_OF_NOISE)}
     said = of_modes(of_pivots(said, pivots), rod)
-    names = (*_unknown_names(said, measured, rig, cell, present, gauge, of_joint), *of_joint)
+    hidden = _hidden(measured, rig, cell, present, gauge)
+    own = [name for name, value in said.items() if not isinstance(value, float) and name not in hidden]
+    names = (*_told_apart(own, rig, present, of_joint), *of_joint)
     if "stem" in names:
         _refuse_shifted_stem(measured, names, gauge)
     known = {n: v for n, v in said.items() if isinstance(v, float) and (gauge or n not in GROUPS["gauge"])}
@@ -223,23 +225,13 @@ def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool =
     )
 
 
-def _unknown_names(
-    said: Mapping[str, Unknown],
-    measured: xr.Dataset,
-    rig: Rig,
-    cell: LoadCell,
-    present: Sequence[str],
-    gauge: bool,
-    of_joint: Collection[str],
-) -> list[str]:
-    """Return the names of the unknowns that the record shows, beside those of the calibration."""
-    hidden = _hidden(measured, rig, cell, present, gauge)
-    names = [name for name, value in said.items() if not isinstance(value, float) and name not in hidden]
+def _told_apart(names: list[str], rig: Rig, present: Sequence[str], of_joint: Collection[str]) -> list[str]:
+    """Return names without the stiffness if all gains, here or calibrated, have its effect; refuse both if named."""
     every_gain = [f"{name}_gain" for name in present]
     if "rigidity_scale" in names and set(every_gain) <= {*names, *of_joint}:
         if not rig.is_named("rigidity_scale"):
-            names.remove("rigidity_scale")
-        elif set(every_gain) <= set(names):
+            return [name for name in names if name != "rigidity_scale"]
+        if set(every_gain) <= set(names):
             raise ParameterError(
                 f"rigidity_scale and {', '.join(every_gain)} cannot all be unknown: a stiffer rod and larger gains "
                 "have the same effect; say that one of them is known, like rigidity_scale = 1"

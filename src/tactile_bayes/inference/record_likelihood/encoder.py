@@ -23,18 +23,15 @@ class EncoderErrors:
         noise, step = cell.drive_angle_noise, cell.drive_angle_resolution
         # The sum resolves loads that change by their noise over the distance of nodes.
         resolved = float(np.min(np.where(cell.noise > 0.0, cell.noise, np.inf) / _STEEP))
-        self.errors: Floats
-        self.log_weights: Floats
         if noise:
             distance = noise * float(np.clip(resolved / noise, _NARROWEST, _WIDEST))
             half = int(np.ceil((_REACH * noise + 0.5 * step) / distance))
-            self.errors = np.linspace(-half * distance, half * distance, 2 * half + 1)
-            self.log_weights = _log_density(self.errors, noise, step)
+            errors = np.linspace(-half * distance, half * distance, 2 * half + 1)
+            logs = _log_density(errors, noise, step)
         else:
             count = int(np.ceil(step / resolved)) + 2 if step else 1
-            self.errors = step * ((np.arange(count) + 0.5) / count - 0.5)
-            self.log_weights = np.zeros(count)
-        self.log_weights = self.log_weights - logsumexp(self.log_weights)
+            errors, logs = step * ((np.arange(count) + 0.5) / count - 0.5), np.zeros(count)
+        self.errors, self.log_weights = errors, logs - logsumexp(logs)
 
     @property
     def count(self) -> int:

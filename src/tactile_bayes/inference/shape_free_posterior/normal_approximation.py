@@ -68,12 +68,13 @@ class NormalApproximation:
         self.white = white_scales(observer.model)
         self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None])[0])
         known, self._count = family.radius.directions, family.radius.count
+        self._vertex = slice(1 + self._count, 3 + self._count)
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         self._radius = family.radius
         log_radius = self._log_radius(scales[None], linear[None])[0]
         self._centre = np.append(log_radius, linear[1 + self._count :])
-        self._observations = linearised(observer, prior, scales, self._centre)
-        slopes = self._observations.slopes
+        self.observations = linearised(observer, prior, scales, self._centre)
+        slopes = self.observations.slopes
         # The map from linear parameters to observations, at every length scale of the tabulated directions.
         nodes = known.values.shape[1]
         through = np.empty((len(known.values), linear.size, len(slopes)))
@@ -85,15 +86,6 @@ class NormalApproximation:
         deviations = solve_triangular(root[0], np.eye(linear.size), lower=True)  # a row for each direction
         radii = self._log_radius(np.tile(scales, (linear.size, 1)), deviations)
         self._anchor = Anchor.best(log_radius, radii, deviations[:, self._vertex])
-
-    @property
-    def scatter(self) -> Floats:
-        """Robust standard deviation of the readings from those at that point, in the unit of the white noise."""
-        return self._observations.scatter
-
-    @property
-    def _vertex(self) -> slice:
-        return slice(1 + self._count, 3 + self._count)
 
     def _log_radius(self, scales: Floats, linear: Floats) -> Floats:
         """Return log-radii at the nodes, (n, nodes), from scales (n, scales) and linear parameters (n, d)."""
@@ -111,7 +103,7 @@ class NormalApproximation:
         and one over that noise, (n, observations); that of the snap-offs is known."""
         at = np.clip(np.log(scales[:, 1]), self._through.x[0], self._through.x[-1])
         noise = self._smooth.beside(scales[:, self.white], scales[:, self.white.stop :])
-        certainty = np.hstack([1.0 / noise, np.ones((len(scales), 1))])[:, self._observations.kinds]
+        certainty = np.hstack([1.0 / noise, np.ones((len(scales), 1))])[:, self.observations.kinds]
         through = self._through(at) * certainty[:, None, :]
         through[:, 1 : 1 + self._count] *= scales[:, :1, None]
         return np.swapaxes(through, 1, 2), certainty
@@ -123,7 +115,7 @@ class NormalApproximation:
         radii = self._log_radius(np.tile(scales, (len(each), 1)), each).T
         units = np.append(np.ones(len(radii)), np.sqrt(self.prior.precision[1 + self._count :]))
         rows = np.vstack([through, radii, each[1 + self._count :] * units[len(radii) :, None]])
-        observed = certainty * (self._observations.slopes @ self._centre)
+        observed = certainty * (self.observations.slopes @ self._centre)
         return np.asarray(np.linalg.lstsq(rows, np.append(observed, units * self._centre))[0])
 
     def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
@@ -140,7 +132,7 @@ class NormalApproximation:
         size, root = self.prior.mean.size, np.sqrt(self.prior.precision)
         rows = np.zeros((len(scales), size + through.shape[1], size + 1))
         rows[:, :size] = np.column_stack([np.diag(root), root * self.prior.mean])
-        rows[:, size:, :size], rows[:, size:, size] = through, certainty * self._observations.values
+        rows[:, size:, :size], rows[:, size:, size] = through, certainty * self.observations.values
         upper = np.asarray(np.linalg.qr(rows, mode="r"))
         return upper * np.copysign(1.0, np.diagonal(upper, axis1=1, axis2=2))[..., None]
 
@@ -162,7 +154,7 @@ class NormalApproximation:
         root = np.sqrt(self.prior.precision)
         _, sizes, axes = np.linalg.svd(slopes := through / root)
         pull = axes @ (
-            slopes.T @ (certainty * self._observations.values - through @ start) + root * (self.prior.mean - start)
+            slopes.T @ (certainty * self.observations.values - through @ start) + root * (self.prior.mean - start)
         )
         precision = 1.0 + damping[:, None] + np.pad(sizes**2, (0, start.size - sizes.size))
         there = start + (pull / precision) @ axes / root
@@ -205,5 +197,5 @@ class NormalApproximation:
         known = scales.copy()
         known[self.white.stop :] = 0.0  # a discrepancy is no white noise, from which the size of the residuals tells it
         upper, noise = self._triangular(known[None])[0], scales[self.white]
-        volume = np.sum(self._observations.readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
+        volume = np.sum(self.observations.readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
         return float(-0.5 * upper[-1, -1] ** 2 - volume)

@@ -145,10 +145,9 @@ def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: 
         least = np.maximum(np.log(model.low[columns]) + _MIN_BOUND_DISTANCE, here - _MAX_LOG_STEP)
         most = np.minimum(np.log(model.high[columns]) - _MIN_BOUND_DISTANCE, here + _MAX_LOG_STEP)
         noise = approximation.white
-        least[noise] = np.clip(np.log(0.5 * approximation.scatter), least[noise], most[noise])
-    return np.exp(
-        minimize(cost, here, method="L-BFGS-B", bounds=list(zip(least.tolist(), most.tolist(), strict=True))).x
-    )
+        least[noise] = np.clip(np.log(0.5 * approximation.observations.scatter), least[noise], most[noise])
+    bounds = list(zip(least.tolist(), most.tolist(), strict=True))
+    return np.exp(minimize(cost, here, method="L-BFGS-B", bounds=bounds).x)
 
 
 def _linear_prior(model: ContourModel, rng: np.random.Generator) -> LinearPrior:
