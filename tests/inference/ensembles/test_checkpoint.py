@@ -282,15 +282,11 @@ def test_a_description_that_is_none_or_of_another_state_is_refused(begun, change
     refuse(begun, named, identity=SAME)
 
 
-def test_a_folder_of_other_things_is_refused(tmp_path):
+def test_a_file_and_a_folder_of_other_things_are_refused(tmp_path):
     (tmp_path / "results.nc").write_bytes(b"years of work")
     refuse(tmp_path, "'results.nc'", "checkpoint.npz")
-
-
-def test_a_file_is_refused(tmp_path):
-    (tmp_path / "run").write_bytes(b"")
-    with refused(InferenceError, tmp_path / "run"):
-        draw(tmp_path / "run")
+    with refused(InferenceError, tmp_path / "results.nc"):
+        draw(tmp_path / "results.nc")
 
 
 def test_a_damaged_file_is_refused_or_as_it_was(tmp_path):

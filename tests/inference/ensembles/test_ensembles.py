@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from arviz_stats.base.array import array_stats
-from scipy import stats
 from scipy.signal import lfilter
 
 from helpers.interrupts import interrupted_at
@@ -31,31 +30,6 @@ def draw_from(log_probability, parameters, *, settings=None, seed=1, scale=2.0, 
     return sample(log_probability, start, names=names, seed=seed, settings=settings, **options)
 
 
-@pytest.mark.slow
-def test_moments_of_a_truncated_gaussian():
-    """A hard wall: moments of scipy's truncated normal within 4 standard errors; false alarm 3e-4."""
-    low, high = np.array([0.0, -0.5]), np.array([np.inf, 0.25])
-    truth = stats.truncnorm(low, high)
-
-    def log_probability(x):
-        return np.where(np.all((x > low) & (x < high), axis=-1), standard(x), -np.inf)
-
-    def prior(rng, n):
-        return np.column_stack([rng.uniform(-1.0, 4.0, n), rng.uniform(-1.0, 1.0, n)])
-
-    start = scatter_walkers(log_probability, prior, parameters=2, seed=3)
-    draws = sample(log_probability, start, names=["a", "b"], seed=4)
-    assert draws.converged, draws.message
-    assert np.all(np.isfinite(draws.log_probability))
-    values = draws.samples.reshape(-1, 2)
-    mean, sd = truth.mean(), truth.std()
-    ess = np.minimum(draws.ess_bulk, draws.ess_tail)
-    assert np.all(np.abs(values.mean(axis=0) - mean) < 4.0 * sd / np.sqrt(ess))
-    cases = zip(low, high, mean, strict=True)
-    fourth = np.array([stats.truncnorm(a, b).expect(lambda x, m=m: (x - m) ** 4) for a, b, m in cases])
-    assert np.all(np.abs(((values - mean) ** 2).mean(axis=0) - sd**2) < 4.0 * np.sqrt((fourth - sd**4) / ess))
-
-
 def with_lost_walkers(count, **options) -> Draws:
     """Draws from 192 walkers, the first of which cannot leave a mode of weight e⁻⁵⁰."""
 
@@ -81,16 +55,6 @@ def test_a_run_that_took_walkers_back_resumes_as_if_uninterrupted(tmp_path):
     for steps in (25, 60, 6000):
         parts = with_lost_walkers(1, settings=SamplerSettings(max_steps=steps), checkpoint=tmp_path / "parts")
     np.testing.assert_array_equal(parts.samples, whole.samples)
-
-
-def test_same_seed_same_draws():
-    first, again, other = (draw_from(standard, 2, settings=SMALL, seed=seed) for seed in (5, 5, 6))
-    np.testing.assert_array_equal(first.samples, again.samples)
-    np.testing.assert_array_equal(first.log_probability, again.log_probability)
-    assert not np.any(first.samples[:, -1] == other.samples[:, -1])
-    sequence = np.random.SeedSequence(5)
-    for _ in range(2):  # asking a sequence twice gives the same children
-        np.testing.assert_array_equal(draw_from(standard, 2, settings=SMALL, seed=sequence).samples, first.samples)
 
 
 def test_ensembles_are_independent_of_each_other_and_of_numpys_global_state():

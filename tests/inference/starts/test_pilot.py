@@ -64,10 +64,3 @@ def test_starting_points_stay_where_they_are():
     """Other coordinates name the same parameters."""
     _, before, after = _found(np.full(_SIZE, 0.5), 2.0 * np.eye(_SIZE), spread=2.0)
     np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-12)
-
-
-def test_coordinates_that_are_standard_normal_hardly_change():
-    """The root stays one, and the mean is that of few draws."""
-    found, _, _ = _found(np.zeros(_SIZE), np.eye(_SIZE), spread=1.0)
-    np.testing.assert_array_equal(found.root, np.eye(_SIZE))
-    assert np.all(np.abs(found.mean) < 5.0 / np.sqrt(_WALKERS))
