@@ -17,12 +17,7 @@ from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
 from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import split_prediction
 from tactile_bayes.assessment.wording import UNCONVERGED, conclusion, sentences
-from tactile_bayes.checks import (
-    check_path,
-    check_probability,
-    check_switch,
-    check_whole_number,
-)
+from tactile_bayes.checks import check_path, check_probability, check_switch, check_whole_number
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.family import Family
@@ -183,26 +178,14 @@ def trust(
 
     if replicates:
         calibrated = posterior_calibration(
-            posterior,
-            experiment,
-            seed=seed,
-            replicates=replicates,
-            probability=chance,
-            out=out,
-            workers=of_all(0),
+            posterior, experiment, seed=seed, replicates=replicates, probability=chance, out=out, workers=of_all(0)
         )
         of_claims = calibrated[list(_OF_CALIBRATION)].rename(quantity="ranked")
         found = found.merge(of_claims).merge(calibrated[["factor", "corrected"]])
         found = found.assign(_corrected(found, regions.get("in_gap", np.empty(0))))
     if assumptions:
         other = band_by_assumption(
-            posterior,
-            experiment,
-            x[::_EVERY],
-            chance,
-            seed=seed,
-            out=out,
-            workers=of_all(replicates),
+            posterior, experiment, x[::_EVERY], chance, seed=seed, out=out, workers=of_all(replicates)
         )
         found = found.merge(other).assign(_moved(other, regions))
     concluded, summary = conclusion(found, check, parts, calibrated, is_converged)

@@ -26,11 +26,7 @@ _SETS = {
 
 
 def conclusion(
-    found: xr.Dataset,
-    check: xr.Dataset,
-    parts: xr.Dataset,
-    calibrated: xr.Dataset | None,
-    is_converged: bool,
+    found: xr.Dataset, check: xr.Dataset, parts: xr.Dataset, calibrated: xr.Dataset | None, is_converged: bool
 ) -> tuple[str, str]:
     """Return the conclusion, and a sentence with its reasons."""
     share = f"{found.attrs['probability']:.3g}"

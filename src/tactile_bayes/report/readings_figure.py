@@ -14,15 +14,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.stored_experiment import segments_of
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
 from tactile_bayes.plotting.maps import outline
-from tactile_bayes.record import (
-    CHANNELS,
-    bases_of,
-    carried_sweeps,
-    frame_of,
-    present_channels,
-    travels_of,
-    turned,
-)
+from tactile_bayes.record import CHANNELS, bases_of, carried_sweeps, frame_of, present_channels, travels_of, turned
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.frames import Frames

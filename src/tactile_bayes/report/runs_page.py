@@ -142,11 +142,7 @@ def _names(folders: Sequence[Path]) -> dict[Path, str]:
 
 
 def _table(
-    names: Mapping[Path, str],
-    errors: Mapping[Path, str],
-    found: Mapping[Path, _Found],
-    out: Path,
-    reference: Overlay,
+    names: Mapping[Path, str], errors: Mapping[Path, str], found: Mapping[Path, _Found], out: Path, reference: Overlay
 ) -> PageTable:
     """Return a row for each run, of one that failed with the reason."""
     columns = list(dict.fromkeys(column for each in found.values() for column in each.shown))

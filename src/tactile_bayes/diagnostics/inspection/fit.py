@@ -33,12 +33,7 @@ class Fit(NamedTuple):
     correction: str
 
 
-def fit_of(
-    found: Corrected,
-    *,
-    most: float,
-    progress: Callable[[int, int], object] = lambda done, count: None,
-) -> Fit:
+def fit_of(found: Corrected, *, most: float, progress: Callable[[int, int], object] = lambda done, count: None) -> Fit:
     """Return the shares of samples that fit no contact above the pivot, and a correction where one exceeds `most`."""
     record, cell = found.record, found.load_cell
     contacts = contacts_of(found, "constrained")
