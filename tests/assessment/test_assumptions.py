@@ -95,18 +95,16 @@ def test_priors_of_what_remains_are_kept():
 
 @pytest.mark.slow
 def test_bands_are_compared_and_errors_are_outcomes(monkeypatch, tmp_path):
-    experiment = experiment_of(posterior())
-    several = {each.name: each for each in alternatives_of(experiment)}
+    several = {each.name: each for each in alternatives_of(experiment_of(posterior()))}
     chosen = [several["bias inferred"], several["family circle"]]
-    monkeypatch.setattr(module, "alternatives_of", lambda experiment: chosen)
     x = np.linspace(-0.5, 0.5, 5)
-    found = band_by_assumption(posterior(), experiment, x, seed=1, out=tmp_path, workers=1)
+    found = band_by_assumption(posterior(), chosen, x, seed=1, out=tmp_path, workers=1)
     assert found["kind"].values.tolist() == ["added", "family"]
     assert found["fits"].values.tolist() == [1, 0]
     assert float(np.abs(found["moved"].isel(assumption=0)).max()) < 0.5
     assert float(np.abs(found["moved"].isel(assumption=1)).max()) > 0.5
     monkeypatch.setattr(module, "sampled", lambda *given, **options: pytest.fail("it must resume"))
-    assert band_by_assumption(posterior(), experiment, x, seed=1, out=tmp_path, workers=1).equals(found)
+    assert band_by_assumption(posterior(), chosen, x, seed=1, out=tmp_path, workers=1).equals(found)
 
 
 @pytest.mark.slow
@@ -114,9 +112,9 @@ def test_an_alternative_without_a_posterior_is_named(monkeypatch):
     def fail(*given, **options):
         raise InferenceError("no contour")
 
-    experiment = experiment_of(posterior())
     monkeypatch.setattr(module, "sampled", fail)
-    found = band_by_assumption(posterior(), experiment, np.zeros(2), seed=1, workers=1)
+    alternatives = alternatives_of(experiment_of(posterior()))
+    found = band_by_assumption(posterior(), alternatives, np.zeros(2), seed=1, workers=1)
     assert set(found["message"].values) == {"InferenceError: no contour"}
     assert not found["fits"].any()
     assert np.isnan(found["moved"]).all()

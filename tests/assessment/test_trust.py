@@ -97,10 +97,11 @@ def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():
         },
         coords={"x": x, "region": ["in_gap", "beside"]},
     )
-    wider = _corrected(found, np.array([-0.6, 0.6]))
+    regions = {"in_gap": np.array([-0.6, 0.6])}
+    wider = _corrected(found, regions)
     assert wider["corrected_lower"].values.tolist() == [-1.0, -1.5, -1.5, -1.5, -1.0]
     assert wider["corrected_upper"].values.tolist() == [2.0, 3.0, 3.0, 3.0, 2.0]
-    assert _corrected(found.assign(corrected=("region", [0, 0])), x) == {}
+    assert _corrected(found.assign(corrected=("region", [0, 0])), regions) == {}
 
 
 @pytest.mark.slow

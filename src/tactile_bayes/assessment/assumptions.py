@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
@@ -31,8 +31,7 @@ from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
-_MORE = ("base", "drift", "gain", *MEMORY, *COMPLIANCES, "rest_curvature", "taper", "stem", "length")
-_UNKNOWNS = (*STANDARD, *_MORE)
+_UNKNOWNS = (*STANDARD, "base", "drift", "gain", *MEMORY, *COMPLIANCES, "rest_curvature", "taper", "stem", "length")
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 
 _EDGES = ("lower", "median", "upper")
@@ -63,7 +62,6 @@ class _Study:
     x: Floats
     probability: float
     seed: Seed
-    settings: SamplerSettings = field(default=_SETTINGS)
 
     @property
     def identity(self) -> dict[str, str]:
@@ -72,14 +70,14 @@ class _Study:
             "x": repr(self.x.tolist()),
             "probability": repr(self.probability),
             "seed": seed_words(self.seed),
-            "settings": repr(self.settings),
+            "settings": repr(_SETTINGS),
             "version of tactile-bayes": version("tactile-bayes"),
         }
 
 
 def band_by_assumption(
     posterior: xr.DataTree,
-    experiment: Experiment,
+    alternatives: Sequence[Alternative],
     x: Floats,
     probability: float = 0.95,
     *,
@@ -88,15 +86,11 @@ def band_by_assumption(
     workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Infer a record again under every other assumption, and compare the bands. Shapes: x (n,)."""
-    study = _Study(tuple(alternatives_of(experiment)), x, probability, seed)
-    count = len(study.alternatives)
+    study, count = _Study(tuple(alternatives), x, probability, seed), len(alternatives)
     with open_results_store(study.identity, out, _ALTERNATIVES) as store:
         kept = keep_outcomes(store, _inferred, study, count, workers=workers)
     outcomes = [kept[number] for number in range(count)]
-    bands = np.full((count, len(_EDGES), x.size), np.nan)
-    for k, outcome in enumerate(outcomes):
-        if outcome.band:
-            bands[k] = outcome.band
+    bands = np.array([outcome.band or np.full((len(_EDGES), x.size), np.nan) for outcome in outcomes])
     own = contour_band(posterior, x, probability)
     width = (own["upper"] - own["lower"]).values
     unit = length_unit(posterior)
@@ -105,14 +99,14 @@ def band_by_assumption(
     edges = {f"other_{name}": (("assumption", "grid"), bands[:, i], unit) for i, name in enumerate(_EDGES)}
     return xr.Dataset(
         {
-            "kind": ("assumption", [each.kind for each in study.alternatives]),
+            "kind": ("assumption", [each.kind for each in alternatives]),
             "fits": ("assumption", [int(each.fits) for each in outcomes]),
             "converged": ("assumption", [int(each.converged) for each in outcomes]),
             "message": ("assumption", [each.message for each in outcomes]),
             "moved": (("assumption", "grid"), moved, {"units": "1"}),
             **edges,
         },
-        coords={"assumption": [each.name for each in study.alternatives], "grid_x": ("grid", x, unit)},
+        coords={"assumption": [each.name for each in alternatives], "grid_x": ("grid", x, unit)},
         attrs={"probability": probability},
     )
 
@@ -186,7 +180,7 @@ def _inferred(task: tuple[_Study, int]) -> _Outcome:
     try:
         problem = contour_problem(study.alternatives[number].experiment)
         seed = child(study.seed, number)
-        found = sampled(problem, seed=seed, settings=study.settings, with_prior=False)
+        found = sampled(problem, seed=seed, settings=_SETTINGS, with_prior=False)
         found.draws.refuse_interrupted(study.alternatives[number].name)
         band = contour_band(found.tree, study.x, study.probability)
         fits = bool(predictive_check(found.tree).attrs["passed"])

@@ -14,8 +14,6 @@ from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.planning.error_covariance import NoiseWhitening, whitening
 from tactile_bayes.planning.record_information import prior_precision, scaled_cell
 
-# Number of Gauss-Newton steps before the last; starts are draws of the posterior, or truths of predicted records.
-_STEPS = 1
 _DIFFERENCE = 0.1  # step of differences, in posterior standard deviations
 _MOST_CORRELATED = 6000  # largest number of readings whose covariance is factorised, in 0.3 GB
 _TURN = 1e-4  # step of differences of the drive angle [rad]
@@ -88,13 +86,6 @@ class LinearFit(NamedTuple):
         return np.asarray(flat.T @ flat)
 
 
-class _Around(NamedTuple):
-    """A record around a point of its parameters."""
-
-    fit: LinearFit
-    change: Floats  # step to the optimum to first order, in scaled parameters
-
-
 class Linearisation:
     """Linear fits of records that were measured as that of a model, from the posterior's deviations, shape (d,).
 
@@ -134,24 +125,22 @@ class Linearisation:
         return found
 
     def _fits(self, readings: Floats, points: Floats) -> list[LinearFit | None]:
-        for _ in range(_STEPS):
-            around = self._around(readings, points)
-            steps = np.array([np.zeros(self._count) if each is None else each.change for each in around])
-            costs = self._costs(readings, points)
-            open_ = np.isfinite(costs)
-            moved = points.copy()
-            for halving in range(_HALVINGS):
-                further = points.copy()
-                step = 0.5**halving * steps * self._scales
-                further[:, : self._count] = np.clip(further[:, : self._count] + step, self._low, self._high)
-                tried = np.flatnonzero(open_)
-                if not tried.size:
-                    break
-                better = tried[self._costs(readings[tried], further[tried]) < costs[tried]]
-                moved[better] = further[better]
-                open_[better] = False
-            points = moved
-        return [None if each is None else each.fit for each in self._around(readings, points)]
+        """Return the fits after one step; starts are draws of the posterior, or truths of predicted records."""
+        changes = [change for _, change in self._around(readings, points)]
+        costs = self._costs(readings, points)
+        open_ = np.isfinite(costs)
+        moved = points.copy()
+        for halving in range(_HALVINGS):
+            further = points.copy()
+            step = 0.5**halving * np.array(changes) * self._scales
+            further[:, : self._count] = np.clip(further[:, : self._count] + step, self._low, self._high)
+            tried = np.flatnonzero(open_)
+            if not tried.size:
+                break
+            better = tried[self._costs(readings[tried], further[tried]) < costs[tried]]
+            moved[better] = further[better]
+            open_[better] = False
+        return [fit for fit, _ in self._around(readings, moved)]
 
     def _costs(self, readings: Floats, points: Floats) -> Floats:
         """Return the least-squares costs of points, shape (records,), by the load cell alone; infinite out of reach."""
@@ -163,8 +152,8 @@ class Linearisation:
             costs[k] = np.sum(np.clip(residuals, -_CLIPPED, _CLIPPED) ** 2) + pull @ self._prior @ pull
         return costs
 
-    def _around(self, readings: Floats, points: Floats) -> list[_Around | None]:
-        """Return the fit around each point; None where the rod does not reach it."""
+    def _around(self, readings: Floats, points: Floats) -> list[tuple[LinearFit | None, Floats]]:
+        """Return the fit around each point, None out of reach, and the scaled step to its optimum."""
         count, encoder = self._count, self.model.likelihood.load_cell.drive_angle_deviation > 0.0
         moves = _DIFFERENCE * np.vstack([np.zeros(count), np.diag(self._scales), -np.diag(self._scales)])
         many = np.repeat(points[:, None], len(moves) + 2 * encoder, axis=1)
@@ -176,9 +165,10 @@ class Linearisation:
         flat, usable = self._readings(many.reshape(-1, many.shape[-1]), turns.ravel())
         values = flat.reshape(*many.shape[:2], *flat.shape[1:])
         is_usable = usable.reshape(turns.shape)[:, 0]
-        return [self._at(*each) if ok else None for *each, ok in zip(readings, points, values, is_usable, strict=True)]
+        every = zip(readings, points, values, is_usable, strict=True)
+        return [self._at(*each) if ok else (None, np.zeros(count)) for *each, ok in every]
 
-    def _at(self, readings: Floats, point: Floats, values: Floats) -> _Around:
+    def _at(self, readings: Floats, point: Floats, values: Floats) -> tuple[LinearFit, Floats]:
         """Return the fit around a point, from the readings at it and around it, shape (2 d + 1 or 2 d + 3, n, 3)."""
         count = self._count
         here, more, less = values[0], values[1 : count + 1], values[count + 1 : 2 * count + 1]
@@ -195,8 +185,7 @@ class Linearisation:
         left = np.asarray(residuals[..., 0] - by_parameters @ change, dtype=np.float64)
         unit = np.broadcast_to(noise * np.eye(noise.size), (*here.shape, noise.size))
         zeros = white(unit)[..., self.model.present]
-        fit = LinearFit(by_parameters, left, covariance, self._prior, zeros)
-        return _Around(fit, change)
+        return LinearFit(by_parameters, left, covariance, self._prior, zeros), change
 
     def _off(self, readings: Floats, expected: Floats) -> Floats:
         return np.nan_to_num(readings - expected)[..., None]

@@ -6,7 +6,7 @@ import hashlib
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -80,7 +80,7 @@ class PosteriorExperiment:
     starts: Floats  # draws of the posterior from which the start of a joint posterior is made, shape (n, d)
     probability: float  # probability of the intervals that are tested
     seed: Seed
-    settings: SamplerSettings = field(default=_SETTINGS)
+    settings: SamplerSettings
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: the model is built again where it is needed."""
@@ -138,7 +138,7 @@ def _task(
 ) -> PosteriorExperiment:
     """Return the truths and their records, from the predictions of the posterior."""
     names = experiment.model.names
-    points = points_of(posterior, names)
+    points = points_of(posterior, names).reshape(-1, len(names))
     predicted = posterior["posterior_predictive"].to_dataset().transpose("chain", "draw", "sample")
     available = predicted.sizes["chain"] * predicted.sizes["draw"]
     if available < replicates:
@@ -148,16 +148,9 @@ def _task(
     for i, name in enumerate(CHANNELS):
         if name in predicted:
             readings[..., i] = predicted[name].values.reshape(available, -1)[chosen]
-    every = points.reshape(-1, points.shape[-1])
-    return PosteriorExperiment(
-        experiment,
-        predicted_points(posterior, names)[chosen],
-        readings,
-        every[evenly_spread(len(every), _STARTS)],
-        probability,
-        seed,
-        replace(_SETTINGS, walkers=walkers_of(points.shape[-1])),
-    )
+    truths, starts = predicted_points(posterior, names)[chosen], points[evenly_spread(len(points), _STARTS)]
+    settings = replace(_SETTINGS, walkers=walkers_of(len(names)))
+    return PosteriorExperiment(experiment, truths, readings, starts, probability, seed, settings)
 
 
 def _replicate(task: tuple[PosteriorExperiment, int]) -> Outcome:
@@ -177,17 +170,15 @@ def _made(experiment: PosteriorExperiment, number: int) -> Outcome:
     simulation = _simulation(experiment, number)
     joint = JointModel(model, replace(experiment.experiment, record=simulation.measured).model)
     walk = _walk(joint, experiment, for_start)
-    loaded = np.zeros(len(model.likelihood.measured), dtype=bool)
-    problem = ContourProblem(joint, experiment.experiment.about, loaded)
+    problem = ContourProblem(joint, experiment.experiment.about, np.zeros(len(model.likelihood.measured), dtype=bool))
     result = sampled(problem, seed=for_posterior, settings=experiment.settings, walk=walk, with_prior=False)
     result.draws.refuse_interrupted(f"replicate {number}")
-    outcome = compared(joint, result, simulation, experiment.probability, rng)
-    record = experiment.experiment.record
+    probability, record = experiment.probability, experiment.experiment.record
+    outcome = compared(joint, result, simulation, probability, rng)
     angles = record.drive_angle.values - experiment.experiment.noise.cell.misread(record.direction.values)
-    numbers = dict(outcome.numbers)
     exact = experiment.exact_model.likelihood
-    numbers |= contact_coverage(joint, result, simulation, exact, angles, angles, experiment.probability, rng)
-    return outcome._replace(numbers=numbers | _ratios(result.tree, simulation, experiment.probability))
+    contacts = contact_coverage(joint, result, simulation, exact, angles, angles, probability, rng)
+    return outcome._replace(numbers={**outcome.numbers, **contacts, **_ratios(result.tree, simulation, probability)})
 
 
 def _simulation(experiment: PosteriorExperiment, number: int) -> Simulation:
@@ -206,18 +197,16 @@ def _simulation(experiment: PosteriorExperiment, number: int) -> Simulation:
 def _walk(joint: JointModel, experiment: PosteriorExperiment, seed: np.random.SeedSequence) -> Walk:
     """Return the start of the walkers, from draws of the posterior weighted by the further readings."""
     rng, size = np.random.default_rng(seed), len(joint.names)
-    coordinates = joint.coordinates
+    coordinates, ends = joint.coordinates, joint.walked_ends
     target = in_coordinates(joint.log_probability, coordinates)
-    draws = coordinates.of(experiment.starts)
     surplus = joint.log_probability(experiment.starts) - experiment.model.log_probability(experiment.starts)
     if not np.isfinite(surplus).any():
         raise InferenceError("no draw of the posterior is possible together with a record that it predicts")
-    ends = joint.walked_ends
-    fitted = Proposal.fitted(draws, flattened(surplus, _LEAST_EFFECTIVE * size), ends)
+    fitted = Proposal.fitted(coordinates.of(experiment.starts), flattened(surplus, _LEAST_EFFECTIVE * size), ends)
     proposal = approximate(target, fitted.mean, fitted.root @ fitted.root.T, rng, ends=ends)
     start = scatter_walkers(
         lambda points: joint.log_probability(coordinates.parameters(points)[0]),
-        lambda rng, count: proposal.draw_unbounded(rng, count),
+        proposal.draw_unbounded,
         parameters=size,
         seed=seed,
         settings=experiment.settings,
@@ -245,22 +234,17 @@ def _summary(task: PosteriorExperiment, outcomes: Mapping[int, Outcome]) -> xr.D
         for k, row in outcomes.items()
     }
     found = summary(task.identity, task.probability, plain)
-    regions, factors, needed = ("in_gap", "beside"), [], []
+    regions, factors, needed = ["in_gap", "beside"], [], []
     for region in regions:
-        start = f"{_RATIO}_{region}_"
+        start, claim = f"{_RATIO}_{region}_", f"pointwise_{region}"
         ratios = np.array([v for row in outcomes.values() for name, v in row.numbers.items() if name.startswith(start)])
         ratios = ratios[np.isfinite(ratios)]
         factors.append(float(np.quantile(ratios, task.probability)) if ratios.size else np.nan)
-        claim = f"pointwise_{region}"
-        needed.append(claim in found.claim and _is_too_narrow(found.sel(claim=claim), found.attrs))
-    return found.assign_coords(region=list(regions)).assign(
-        factor=("region", factors), corrected=("region", np.array(needed, dtype=int))
-    )
+        needed.append(int(claim in found.claim and _is_too_narrow(found.sel(claim=claim), found.attrs)))
+    return found.assign_coords(region=regions).assign(factor=("region", factors), corrected=("region", needed))
 
 
 def _is_too_narrow(claim: xr.Dataset, attrs: Mapping[Any, Any]) -> bool:
     """Return True if a band holds less often than stated, at the level of the calibration."""
     share, count, stated = float(claim.coverage), int(claim.coverage_replicates), float(attrs["probability"])
-    if not share < stated:
-        return False
-    return bool(coverage_p_value(share, count, stated, is_whole=False) <= attrs["level"])
+    return share < stated and bool(coverage_p_value(share, count, stated, is_whole=False) <= attrs["level"])

@@ -40,9 +40,8 @@ def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapp
         together = points[..., [model.names.index(name) for name in joint.priors]]
         of_rig = of_rig + joint.log_dependence(together.reshape(-1, together.shape[-1])).reshape(every.shape)
     parts = {"contour": of_contour, "rig": of_rig, "likelihood": every - of_contour - of_rig}
-    heights = {name: _heights(posterior, x, every.shape) for name, x in regions.items() if x.size}
     rows = {name: points[..., i][None] for i, name in enumerate(model.names)}
-    rows |= {f"band {name}": values for name, values in heights.items()}
+    rows |= {f"band {name}": _heights(posterior, x, every.shape) for name, x in regions.items()}
     kept = np.flatnonzero((every > np.median(every) - LOST_BELOW).all(axis=0))
     found = np.zeros((len(rows), len(_COMPONENTS)))
     for k, name in enumerate(_COMPONENTS):
@@ -61,9 +60,7 @@ def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapp
 def _what_sets(contour: float, rig: float, likelihood: float) -> str:
     """Return "record", "both" or "prior", whichever sets a quantity, from the sensitivities to the three components."""
     prior = max(contour, rig)
-    if prior < _SENSITIVE:
-        return "record"
-    return "both" if likelihood > prior else "prior"
+    return "record" if prior < _SENSITIVE else "both" if likelihood > prior else "prior"
 
 
 def _heights(posterior: xr.DataTree, x: Floats, shape: tuple[int, ...]) -> Floats:
@@ -83,11 +80,6 @@ def _weights(log_density: Floats, power: float) -> Floats:
 
 
 def _sensitivity(values: Floats, weights: list[Floats]) -> float:
-    lower, upper = weights
     if np.ptp(values) == 0.0:
         return 0.0
-    return float(
-        array_stats.power_scale_sense(
-            values, lower_w=lower, upper_w=upper, lower_alpha=_POWERS[0], upper_alpha=_POWERS[1]
-        )
-    )
+    return float(array_stats.power_scale_sense(values, *weights, *_POWERS))

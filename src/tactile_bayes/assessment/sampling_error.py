@@ -35,22 +35,19 @@ def sampling_error(posterior: xr.DataTree, x: ArrayLike, probability: float = 0.
     errors = np.full((3, at.size), np.nan)
     for row, level in zip(errors, (low, middle, high), strict=True):
         row[known] = array_stats.mcse(heights[known], method="quantile", prob=level)
-    ends = np.quantile(heights[known], [low, high], axis=(1, 2))
+    lower, upper = np.quantile(heights[known], [low, high], axis=(1, 2))
     share = np.full(at.size, np.nan)
     with np.errstate(invalid="ignore"):  # a band without width has no error either
-        share[known] = np.nan_to_num(np.maximum(errors[0], errors[2])[known] / (ends[1] - ends[0]))
+        share[known] = np.nan_to_num(np.maximum(errors[0], errors[2])[known] / (upper - lower))
     effective = [array_stats.ess(heights[known], method="quantile", prob=level) for level in (low, high)]
-    draws = heights[0].size
-    needed = math.ceil(draws * (float(np.nanmax(share)) / WANTED_SHARE) ** 2)
-    unit = length_unit(posterior)
-    names = ("lower_error", "median_error", "upper_error")
+    draws, unit, names = heights[0].size, length_unit(posterior), ("lower_error", "median_error", "upper_error")
     return xr.Dataset(
         {
             **{name: ("x", row, unit) for name, row in zip(names, errors, strict=True)},
             "share": ("x", share, {"units": "1"}),
             "draws": draws,
             "effective_draws": float(np.nanmin(effective)),
-            "draws_needed": needed,
+            "draws_needed": math.ceil(draws * (float(np.nanmax(share)) / WANTED_SHARE) ** 2),
         },
         coords={"x": ("x", at, unit)},
         attrs={"probability": probability},

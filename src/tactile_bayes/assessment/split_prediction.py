@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy import stats
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Flags
 from tactile_bayes.assessment.linear_fit import LinearFit, Linearisation
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
@@ -21,16 +20,6 @@ FALSE_ALARM = 0.01  # probability of an alarm if the model holds
 _RECORDS = 199  # number of predicted records with which the real one is compared
 _FEWEST_RECORDS = 99  # least number of predicted records: with fewer an alarm would be impossible
 _NOISE = "noise"
-
-
-class _Row(NamedTuple):
-    """Disagreements of one record, by part."""
-
-    ratios: Floats  # shape (parts,)
-    measured: Floats  # degrees of freedom of the ratios, shape (parts,)
-    moves: Floats  # shape (parts, parameters)
-    freedom: float
-    scatter: float
 
 
 def split_prediction(posterior: xr.DataTree, model: ContourModel) -> xr.Dataset:
@@ -59,11 +48,10 @@ def split_prediction(posterior: xr.DataTree, model: ContourModel) -> xr.Dataset:
     for i, (name, unit) in enumerate(zip(CHANNELS, model.likelihood.rod.load_units, strict=True)):
         if name in predicted:
             records[1:, :, i] = predicted[name].values.reshape(-1, records.shape[1])[chosen] / unit
-    fits = linear.fits(records, np.vstack([best[None], starts]))
-    if fits[0] is None:
+    first, *others = linear.fits(records, np.vstack([best[None], starts]))
+    if first is None:
         raise InferenceError("the most probable contour of the posterior is out of reach: infer it again")
-    rows = [_row(fit, parts) for fit in fits if fit is not None]
-    return _labelled(rows, list(parts), model.forward_parameters)
+    return _compared([first, *(fit for fit in others if fit is not None)], parts, model.forward_parameters)
 
 
 def parts_of(model: ContourModel) -> dict[str, Flags]:
@@ -87,40 +75,29 @@ def parts_of(model: ContourModel) -> dict[str, Flags]:
     return parts | {"earlier half": early, "later half": ~early}
 
 
-def _row(fit: LinearFit, parts: Mapping[str, Flags]) -> _Row:
-    found = [fit.disagreement(~part) for part in parts.values()]
-    return _Row(
-        np.array([each.ratio for each in found]),
-        np.array([float(max(each.measured, 1)) for each in found]),
-        np.array([each.moves for each in found]),
-        fit.freedom,
-        fit.scatter,
-    )
-
-
-def _labelled(rows: list[_Row], parts: list[str], parameters: tuple[str, ...]) -> xr.Dataset:
+def _compared(fits: list[LinearFit], parts: Mapping[str, Flags], parameters: tuple[str, ...]) -> xr.Dataset:
     """Return the result for the first of the records, with the others as reference."""
-    ratios, measured = (np.stack([getattr(row, name) for row in rows]) for name in ("ratios", "measured"))
-    freedom = np.array([[row.freedom] for row in rows])
-    if len(rows) <= _FEWEST_RECORDS:
-        raise InferenceError(f"only {len(rows) - 1} predicted records can be fitted, too few: sample longer")
+    if len(fits) <= _FEWEST_RECORDS:
+        raise InferenceError(f"only {len(fits) - 1} predicted records can be fitted, too few: sample longer")
+    found = [[fit.disagreement(~part) for part in parts.values()] for fit in fits]
+    ratios = np.array([[each.ratio for each in row] for row in found])
+    measured = np.array([[max(each.measured, 1) for each in row] for row in found])
+    freedom, scatter = (np.array([[getattr(fit, name)] for fit in fits]) for name in ("freedom", "scatter"))
     expected = freedom / np.maximum(freedom - 2.0, 1.0)
     inflated = np.mean((ratios / expected)[1:], axis=0)
     p_values = stats.f.sf(ratios / inflated, measured, freedom)
-    scatter = np.array([row.scatter for row in rows])
-    typical = scatter[1:].mean()
-    below = stats.chi2.cdf(scatter / typical * freedom[:, 0], freedom[:, 0])
-    p_values = np.column_stack([p_values, 2.0 * np.minimum(below, 1.0 - below)])
+    below = stats.chi2.cdf(scatter / scatter[1:].mean() * freedom, freedom)
+    p_values = np.hstack([p_values, 2.0 * np.minimum(below, 1.0 - below)])
     least = p_values.min(axis=1)
     overall = float(np.mean(least <= least[0]))
-    moves = np.vstack([rows[0].moves, np.full((1, len(parameters)), np.nan)])
+    moves = [*(each.moves for each in found[0]), np.full(len(parameters), np.nan)]
     return xr.Dataset(
         {
             "p_value": ("part", p_values[0]),
             "sd": ("part", stats.norm.isf(0.5 * np.maximum(p_values[0], 1e-300))),
-            "moves": (("part", "parameter"), moves),
+            "moves": (("part", "parameter"), np.array(moves)),
             "overall_p_value": overall,
         },
         coords={"part": [*parts, _NOISE], "parameter": list(parameters)},
-        attrs={"false_alarm": FALSE_ALARM, "passed": int(overall > FALSE_ALARM), "records": len(rows) - 1},
+        attrs={"false_alarm": FALSE_ALARM, "passed": int(overall > FALSE_ALARM), "records": len(fits) - 1},
     )

@@ -19,6 +19,7 @@ from tactile_bayes.assessment.split_prediction import split_prediction
 from tactile_bayes.assessment.wording import UNCONVERGED, conclusion, sentences
 from tactile_bayes.checks import check_path, check_probability, check_switch, check_whole_number
 from tactile_bayes.diagnostics.predictive_check import predictive_check
+from tactile_bayes.diagnostics.result_check import probability_of
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import contour_draws, read_result
@@ -30,12 +31,9 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.rod_reach import reach
 from tactile_bayes.uncertainty.summary import gap_if_any
 
-_USUAL = 0.95  # probability of the band if a posterior does not state one
 # Number of grid points of each region, the gap and both sides of it, at which the effect of the prior is computed.
 _GRID_POINTS = 9
 _EVERY = 5  # every so many grid points of the band, those of other assumptions are computed
-_ENDS = ("left", "right")
-
 _OF_CALIBRATION = ("rank_p_value", "coverage", "coverage_error", "coverage_replicates", "noticed_below")
 
 
@@ -140,13 +138,11 @@ def trust(
     """
     check_whole_number("replicates", replicates, 0)
     check_switch("assumptions", assumptions)
-    seed = seed_sequence(rng)
-    workers = workers_of(workers)
+    seed, workers = seed_sequence(rng), workers_of(workers)
     if out is not None:
         check_path("out", out, "give the path of a folder, or None")
     posterior = _posterior_of(run_or_posterior)
-    stated = posterior.attrs.get("probability", _USUAL) if probability is None else probability
-    chance = check_probability("probability", stated)
+    chance = check_probability("probability", probability_of(posterior) if probability is None else probability)
     experiment = experiment_of(posterior, family, rig)
     if not experiment.events:
         raise InferenceError("the posterior leaves unloaded samples out (events=False): infer it with them")
@@ -155,9 +151,8 @@ def trust(
         replicates, assumptions = 0, False
     x = reach(posterior)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        found = sampling_error(posterior, x, chance)
         band = contour_band(posterior, x, chance)
-        found = found.assign({name: band[name] for name in ("lower", "median", "upper")})
+        found = sampling_error(posterior, x, chance).assign({name: band[name] for name in ("lower", "median", "upper")})
         check = predictive_check(posterior)
         if check.attrs["not_checked"]:
             raise InferenceError(f"there is nothing to judge this posterior by: {check.attrs['not_checked']}")
@@ -166,13 +161,13 @@ def trust(
         found = found.merge(parts.rename(p_value="part_p_value", sd="part_sd", overall_p_value="split_p_value"))
         regions = _regions(posterior, x, chance)
         found = found.merge(prior_sensitivity(posterior, experiment.model, regions))
-    others = len(alternatives_of(experiment)) if assumptions else 0
+    others = alternatives_of(experiment) if assumptions else []
     calibrated: xr.Dataset | None = None
 
     def of_all(before: int) -> Workers:
         def report(now: TaskProgress) -> None:
             if workers.progress is not None:
-                workers.progress(now._replace(done=before + now.done, wanted=replicates + others))
+                workers.progress(now._replace(done=before + now.done, wanted=replicates + len(others)))
 
         return Workers(workers.where, report)
 
@@ -182,10 +177,10 @@ def trust(
         )
         of_claims = calibrated[list(_OF_CALIBRATION)].rename(quantity="ranked")
         found = found.merge(of_claims).merge(calibrated[["factor", "corrected"]])
-        found = found.assign(_corrected(found, regions.get("in_gap", np.empty(0))))
+        found = found.assign(_corrected(found, regions))
     if assumptions:
         other = band_by_assumption(
-            posterior, experiment, x[::_EVERY], chance, seed=seed, out=out, workers=of_all(replicates)
+            posterior, others, x[::_EVERY], chance, seed=seed, out=out, workers=of_all(replicates)
         )
         found = found.merge(other).assign(_moved(other, regions))
     concluded, summary = conclusion(found, check, parts, calibrated, is_converged)
@@ -221,36 +216,34 @@ def _posterior_of(given: str | os.PathLike[str] | xr.DataTree) -> xr.DataTree:
 def _regions(posterior: xr.DataTree, x: Floats, probability: float) -> dict[str, Floats]:
     """Return grid points in the gap and beside it; only beside, if the sweeps overlap or have one direction."""
     edges = gap_if_any(posterior, probability)
-    left, right = (np.nan, np.nan) if edges is None else (float(edges[end].sel(bound="median")) for end in _ENDS)
+    left, right = (np.nan if edges is None else float(edges[end].sel(bound="median")) for end in ("left", "right"))
     if not left < right:
         return {"beside": np.linspace(x[0], x[-1], 2 * _GRID_POINTS)}
     flanks = [np.linspace(x[0], left, _GRID_POINTS), np.linspace(right, x[-1], _GRID_POINTS)]
     return {"in_gap": np.linspace(left, right, _GRID_POINTS + 2)[1:-1], "beside": np.concatenate(flanks)}
 
 
+def _is_in_gap(x: xr.DataArray, regions: Mapping[str, Floats]) -> xr.DataArray:
+    inside = regions.get("in_gap", np.full(1, np.nan))
+    return (x > inside[0]) & (x < inside[-1])
+
+
 def _moved(other: xr.Dataset, regions: Mapping[str, Floats]) -> dict[str, xr.DataArray]:
     """Return the largest distance of the medians in each region, over the width of the band."""
-    x = other["grid_x"].values
-    inside = np.zeros(x.size, dtype=bool)
-    if "in_gap" in regions:
-        inside = (x > regions["in_gap"][0]) & (x < regions["in_gap"][-1])
-    sizes = np.abs(other["moved"].transpose("assumption", "grid").values)
-    found = {}
-    for region, some in (("in_gap", inside), ("beside", ~inside)):
-        known = np.where(some & np.isfinite(sizes), sizes, -1.0).max(axis=1)
-        found[f"moved_{region}"] = xr.DataArray(np.where(known < 0.0, np.nan, known), dims="assumption")
-    return found
+    sizes = np.abs(other["moved"].drop_attrs())
+    sizes, in_gap = sizes.where(np.isfinite(sizes)), _is_in_gap(other["grid_x"], regions)
+    return {
+        f"moved_{name}": sizes.where(there).max("grid") for name, there in (("in_gap", in_gap), ("beside", ~in_gap))
+    }
 
 
-def _corrected(found: xr.Dataset, in_gap: Floats) -> dict[str, xr.DataArray]:
+def _corrected(found: xr.Dataset, regions: Mapping[str, Floats]) -> dict[str, xr.DataArray]:
     """Return the band with its half widths multiplied by the factors of regions that are corrected; {} if none is."""
-    needed = found["corrected"].values.astype(bool)
-    if not needed.any():
+    if not found["corrected"].any():
         return {}
-    factor = dict(zip(found["region"].values.tolist(), np.where(needed, found["factor"].values, 1.0), strict=True))
-    x = found["x"].values
-    inside = (x > in_gap[0]) & (x < in_gap[-1]) if in_gap.size else np.zeros(x.size, dtype=bool)
-    wide = xr.DataArray(np.where(inside, factor["in_gap"], factor["beside"]), dims="x")
+    factor = found["factor"].where(found["corrected"] == 1, 1.0)
+    of_gap, beside = (factor.sel(region=region, drop=True) for region in ("in_gap", "beside"))
+    wide = xr.where(_is_in_gap(found["x"], regions), of_gap, beside)
     return {
         f"corrected_{end}": (found["median"] + wide * (found[end] - found["median"])).assign_attrs(found[end].attrs)
         for end in ("lower", "upper")

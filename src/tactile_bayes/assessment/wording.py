@@ -8,11 +8,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.assessment.sampling_error import WANTED_SHARE
+from tactile_bayes.diagnostics.result_check import HOLDS, NOT
 
-_HOLDS = "holds"
 _PRIOR = "holds, but the prior sets the gap"
-NOT = "do not rely on it"
-
 UNCONVERGED = (
     "The posterior has not converged, so that replicates and other assumptions are left out: infer it again for longer."
 )
@@ -32,9 +30,7 @@ def conclusion(
     share = f"{found.attrs['probability']:.3g}"
     reasons = []
     if not check.attrs["passed"]:
-        reasons.append(
-            f"the record is unlike those that the posterior predicts (p = {_p(float(check.overall_p_value))})"
-        )
+        reasons.append(f"the record is unlike those that the posterior predicts (p = {_p(check.overall_p_value)})")
     if not parts.attrs["passed"]:
         reasons.append(_worst_part(parts))
     if calibrated is not None and calibrated.attrs["conclusion"] == "not calibrated":
@@ -48,7 +44,7 @@ def conclusion(
             f"The band of probability {share} holds beside the gap, as far as this record shows, but in the gap it is "
             "set by the prior: it is as right as the prior is there."
         )
-    return _HOLDS, f"The band of probability {share} holds, as far as this record shows."
+    return HOLDS, f"The band of probability {share} holds, as far as this record shows."
 
 
 def _worst_part(parts: xr.Dataset) -> str:
@@ -62,7 +58,7 @@ def _worst_part(parts: xr.Dataset) -> str:
     further = f", where the rest moves {' and '.join(named)} standard deviations" if named else ""
     return (
         f"the parts of the record contradict one another: the {name} alone predicts the rest wrongly by "
-        f"{deviations:.1f} standard deviations (p = {_p(float(parts['overall_p_value']))} for all parts){further}"
+        f"{deviations:.1f} standard deviations (p = {_p(parts['overall_p_value'])} for all parts){further}"
     )
 
 
@@ -72,7 +68,8 @@ def sentences(
     """Return sentences on parts, prior, assumptions, calibration and sampling; `mute` parameters are not named."""
     said = [_of_parts(parts), *_of_prior(found, mute), *_of_assumptions(found)]
     if calibrated is not None:
-        said.append(f"For objects and rigs like this one: {_lower(str(calibrated.attrs['verdict']))}")
+        verdict = str(calibrated.attrs["verdict"])
+        said.append(f"For objects and rigs like this one: {verdict[:1].lower()}{verdict[1:]}")
         for region, name in (("in_gap", "in the gap"), ("beside", "beside the gap")):
             of_region = calibrated.sel(region=region)
             if int(of_region["corrected"]):
@@ -93,7 +90,7 @@ def _of_parts(parts: xr.Dataset) -> str:
     )
     agree = "agree" if parts.attrs["passed"] else "disagree"
     return (
-        f"The parts of the record {agree} (p = {_p(float(parts['overall_p_value']))}, of {parts.attrs['records']} "
+        f"The parts of the record {agree} (p = {_p(parts['overall_p_value'])}, of {parts.attrs['records']} "
         f"predicted records): each alone predicts the rest with an error, in standard deviations, of {named}."
     )
 
@@ -135,9 +132,5 @@ def _of_assumptions(found: xr.Dataset) -> list[str]:
     return said
 
 
-def _p(value: float) -> str:
-    return f"{value:.2g}"
-
-
-def _lower(text: str) -> str:
-    return text[:1].lower() + text[1:]
+def _p(value: xr.DataArray) -> str:
+    return f"{float(value):.2g}"

@@ -53,21 +53,14 @@ def predictive_check(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr
     p_values, scores = _p_values(discrepancies), _scores(discrepancies)
     finite = scores[np.isfinite(scores).all(axis=-1)]
     overall = float(_p_values(finite.max(axis=0))) if finite.size else np.nan
-    columns = posterior["constant_data"].to_dataset()
-    per_reading = np.sqrt(columns["block_readings"].values) if are_blocks(record_of(posterior)) else 1.0
-    angle, sweep = columns.drive_angle.values, columns.sweep.values
+    record, predicted = record_of(posterior), posterior["posterior_predictive"].to_dataset()
+    per_reading = np.sqrt(record["block_readings"].values) if are_blocks(record) else 1.0
     worst = [_worst_stretch(of_channel) for of_channel in residuals.values()]
     means = [float(np.mean((r.values[0] * r.scale)[rows])) for r, rows in zip(residuals.values(), worst, strict=True)]
-    travels = {}
-    if carried_sweeps(record_of(posterior)):
-        along = travels_of(record_of(posterior))
-        travels = {
-            f"worst_{end}_travel": ("channel", [float(along[rows[place]]) for rows in worst])
-            for end, place in (("from", 0), ("to", -1))
-        }
+    first, last = np.array([rows[[0, -1]] for rows in worst]).T
+    angle, travel = record["drive_angle"].values, travels_of(record)
+    ends = {"worst_from_travel": ("channel", travel[first]), "worst_to_travel": ("channel", travel[last])}
     false_alarm = max(false_alarm, 1.0 / (1.0 + predictions))
-    predicted = posterior["posterior_predictive"].to_dataset()
-    units = {name: str(predicted[name].attrs.get("units", "1")) for name in channels}
     failed = overall <= false_alarm
     not_checked = "" if failed else _not_checked(residuals, p_values)
     smooth = _smooth(residuals, p_values, false_alarm) if failed else {}
@@ -76,22 +69,19 @@ def predictive_check(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr
         {
             "p_value": (("discrepancy", "channel"), p_values),
             "score": (("discrepancy", "channel"), scores[..., 0]),
-            "worst_sweep": ("channel", [int(sweep[rows[0]]) for rows in worst]),
-            "worst_from": ("channel", [float(angle[rows[0]]) for rows in worst], {"units": "rad"}),
-            "worst_to": ("channel", [float(angle[rows[-1]]) for rows in worst], {"units": "rad"}),
-            **travels,
+            "worst_sweep": ("channel", record["sweep"].values[first]),
+            "worst_from": ("channel", angle[first], {"units": "rad"}),
+            "worst_to": ("channel", angle[last], {"units": "rad"}),
+            **(ends if carried_sweeps(record) else {}),
             "worst_residual": ("channel", means),
-            "neighbour_noise": (
-                "channel",
-                [_neighbour_noise(of_channel, per_reading) for of_channel in residuals.values()],
-            ),
+            "neighbour_noise": ("channel", [_neighbour_noise(each, per_reading) for each in residuals.values()]),
             "smooth": ("channel", [np.nan if described else smooth.get(name, np.nan) for name in channels]),
             "overall_p_value": np.nan if not_checked else overall,
         },
         coords={
             "discrepancy": list(DISCREPANCIES),
             "channel": channels,
-            "unit": ("channel", [units[name] for name in channels]),
+            "unit": ("channel", [str(predicted[name].attrs.get("units", "1")) for name in channels]),
         },
         attrs={
             "passed": int(not failed and not not_checked),
@@ -106,29 +96,26 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
     """Return the residuals of the record and of every prediction, by channel."""
     refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
     posterior_draws(posterior)
-    predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()
-    sweep = posterior["constant_data"].to_dataset().sweep.values
-    sweeps = tuple(rows_of_sweeps(sweep))
-    loaded = _loaded(posterior)
+    predicted, record = posterior["posterior_predictive"].to_dataset(), record_of(posterior)
+    sweeps, loaded = tuple(rows_of_sweeps(record["sweep"].values)), _loaded(posterior, record)
     log_probability = posterior["sample_stats"].to_dataset().lp
     found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - LOST_BELOW).values.ravel()
     residuals = {}
     refuse_not_finite("lp, the log-probability,", log_probability)
     for name, values in predicted.items():
         refuse_not_finite(f"the predicted {name}", values)
-        of_draws = values.values.reshape(-1, sweep.size)[found]
+        of_draws = values.values.reshape(-1, loaded.size)[found]
         low, centre, high = np.quantile(of_draws, [0.025, 0.5, 0.975], axis=0)
         # At snap-off some draws are loaded and others not: such a sample must not outweigh all others.
         scale = (high - low) / 3.92
         scale = np.maximum(scale, float(np.median(scale)) or float(np.std(of_draws - centre)) or 1.0)
-        rows = np.concatenate([observed[name].values[None], of_draws])
+        rows = np.concatenate([record[name].values[None], of_draws])
         residuals[str(name)] = Residuals((rows - centre) / scale, scale, loaded, sweeps)
     return residuals
 
 
-def _loaded(posterior: xr.DataTree) -> Flags:
+def _loaded(posterior: xr.DataTree, record: xr.Dataset) -> Flags:
     """Return True for samples between first contact and snap-off, at the posterior medians of these events."""
-    record = record_of(posterior)
     events = posterior["events"].to_dataset().median(("chain", "draw"))
     segments = segments_of(posterior, record)
     along, place = segments.ways_of_samples, "travel" if segments.has_history else "drive_angle"
@@ -180,11 +167,10 @@ def _not_checked(residuals: dict[str, Residuals], p_values: Floats) -> str:
 
 def _smooth(residuals: dict[str, Residuals], p_values: Floats, false_alarm: float) -> dict[str, float]:
     """Return channels whose residuals are smooth and exceed the noise, with loaded residuals over that noise."""
-    smooth = {}
+    smooth, of_runs = {}, [DISCREPANCIES.index(name) for name in ("runs", "neighbours")]
     for (name, of_channel), p_value in zip(residuals.items(), p_values.T, strict=True):
-        runs = p_value[[DISCREPANCIES.index("runs"), DISCREPANCIES.index("neighbours")]]
         noise, loaded = _neighbour_noise(of_channel), of_channel.loaded
-        if not np.any(runs <= false_alarm) or not loaded.any() or not noise > 0.0:
+        if not np.any(p_value[of_runs] <= false_alarm) or not loaded.any() or not noise > 0.0:
             continue
         size = float(np.sqrt(np.mean(np.square(of_channel.values[0] * of_channel.scale)[loaded])))
         if size > _EXCESS * noise:
@@ -233,8 +219,5 @@ def _worst_stretch(residuals: Residuals) -> Index:
 
 
 def _neighbour_noise(residuals: Residuals, weight: Floats | float = 1.0) -> float:
-    """Return the real record's white noise, from the median size of second differences, so that jumps do not count.
-
-    It is that of the samples times their weight.
-    """
+    """Return the real record's white noise, of the samples times their weight, without jumps (`rough_noise`)."""
     return rough_noise(residuals.values[0] * residuals.scale * weight)

@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -33,7 +33,7 @@ from tactile_bayes.rig.stated import memory_in, sensor_values
 from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.budget import uncertainty_budget
 
-_HOLDS, _NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
+HOLDS, NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
 _NOISES = ("noise_scale", "moment_noise", "force_noise", *GROUPS["discrepancy"])
 
 CONTRADICTION = 1e-4  # probability of the misfit of single samples below which it is reported
@@ -51,12 +51,8 @@ _PRIOR_DOMINATED = 0.7
 _SMALL = 0.05  # probability of a record below which a reader may take agreement for disagreement
 _NARROWER = 0.9  # share of the band's half width below which it is said to be narrower
 # Columns whose zero a parameter is.
-_COLUMN_OF_ZERO = {
-    "moment_bias": "holding_moment",
-    "force_x_bias": "force_x",
-    "force_y_bias": "force_y",
-    "drive_angle_offset": "drive_angle",
-}
+_COLUMN_OF_ZERO = dict(zip((*_ZEROS, "drive_angle_offset"), (*CHANNELS, "drive_angle"), strict=True))
+_USUAL = 0.95  # probability of the band if a posterior does not state one
 _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
     "neighbours": "whose residuals do not scatter about zero but stay on one side",
@@ -104,12 +100,38 @@ class Check:
         too few loaded samples), else empty, `false_alarm` (the probability in effect), `predictions` (their number).
     knows_misfit : bool
         False if the misfit of single samples says nothing, since a reading depends on those before it (lag, play).
+    budget : xr.Dataset or None
+        From `uncertainty_budget`, if all is well and there is a band.
     """
 
     messages: tuple[Finding, ...]
     is_well: bool
     predictive: xr.Dataset | None
     knows_misfit: bool = True
+    budget: xr.Dataset | None = None
+
+
+class _Result(NamedTuple):
+    """A posterior, and what is read of it."""
+
+    posterior: xr.DataTree
+    draws: xr.Dataset
+    record: xr.Dataset
+    cell: LoadCell
+    family: str
+    inferred: list[str]  # unknowns of the rig
+    memory: set[str]  # kinds of memory that are stated, known or inferred
+
+    @classmethod
+    def of(cls, posterior: xr.DataTree) -> _Result:
+        refuse_no_contour(posterior, "posterior")
+        draws, record, attrs = posterior_draws(posterior), record_of(posterior), posterior.attrs
+        cell, inferred = (
+            LoadCell.from_record(record) or LoadCell(),
+            read_json(attrs.get("nuisances", "[]"), "nuisances"),
+        )
+        memory = memory_in(sensor_values(cell), known_of(attrs), dict.fromkeys(inferred, True))
+        return cls(posterior, draws, record, cell, str(attrs.get("family", GAUGE)), inferred, memory)
 
 
 def check(
@@ -186,12 +208,11 @@ def check(
     The family parabola and the rig as assumed do not describe the record | not described | False
     """
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
-    refuse_no_contour(posterior, "posterior")
-    posterior_draws(posterior)
-    record = record_of(posterior)
+    result, attrs = _Result.of(posterior), posterior.attrs
     check_optional("contacts", contacts, xr.Dataset, "give what reconstruct returned")
     if trust is not None and "conclusion" not in getattr(trust, "attrs", {}):
         raise refused("trust", trust, "give what trust returned, or None")
+    conclusion = HOLDS if trust is None else trust.attrs["conclusion"]
     try:
         predictive = predictive_check(posterior, false_alarm=false_alarm)
         not_checked = str(predictive.attrs["not_checked"])
@@ -200,39 +221,49 @@ def check(
     residuals = residuals_of(posterior)  # after the check has released its own: those of a long record are large
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # a finding reports it
-        unloaded = zero_load(record)
-    against = [
-        *unit_and_sign_findings(record),
-        *doubtful_sides(posterior.attrs),
-        *_off_zero(record, unloaded, residuals),
-        *_moved_zero(posterior, record, unloaded),
-    ]
+        unloaded = zero_load(result.record)
+    against = [*unit_and_sign_findings(result.record), *doubtful_sides(attrs)]
+    against += [*_off_zero(result.record, unloaded, residuals), *_moved_zero(result, unloaded)]
     if predictive is not None and not predictive.attrs["passed"] and not not_checked:
-        against.append(_not_described(posterior, predictive))
-    if trust is not None and trust.attrs["conclusion"] == _NOT:
+        against.append(_not_described(result, predictive))
+    if trust is not None and conclusion == NOT:
         against.append(Finding("not reliable", summary=trust.attrs["summary"]))
-    if not posterior.attrs["converged"]:
-        message = posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1)
-        against.append(Finding("not converged", message=message))
-    noisier = 1.0 if predictive is None else _neighbours_over_stated(record, predictive)
-    beyond = _beyond_prior(posterior)
-    against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
-    against += [*_beyond_findings(beyond, record, posterior), *_cut_off(posterior)]
+    if not attrs["converged"]:
+        against.append(Finding("not converged", message=attrs["message"].replace("not converged", "NOT CONVERGED", 1)))
+    noisier = 1.0 if predictive is None else _neighbours_over_stated(result.cell, predictive)
+    beyond = _beyond_prior(result)
+    against += [*_noise(result, noisier), *_contradictions(result, contacts, noisier)]
+    against += [*_beyond_findings(beyond, result), *_cut_off(result)]
     if predictive is not None:
         against += _smooth(predictive)
-    drawn = "particles no longer depend on where they began" if is_streamed(posterior.attrs) else "ensembles agree"
-    if not_checked and posterior.attrs["converged"]:
+    drawn = "particles no longer depend on where they began" if is_streamed(attrs) else "ensembles agree"
+    if not_checked and attrs["converged"]:
         but = "" if against else f"The {drawn}, but this does not say that the result is right. "
         against.append(Finding("not checked", but=but, reason=not_checked))
-    is_well = predictive is not None and not against
+    is_well = not against
     if predictive is not None and is_well:
         against.append(Finding("all is well", drawn=drawn, p_value=_p_value(predictive)))
-    if trust is not None and trust.attrs["conclusion"] not in (_NOT, _HOLDS):
+    if trust is not None and conclusion not in (NOT, HOLDS):
         against.append(Finding("reservation", summary=trust.attrs["summary"]))
-    against += [*_prior_dominated(posterior, known=beyond), *_going_back(posterior, record)]
-    if is_well:
-        against += _width_of_band(posterior)
-    return Check(tuple(against), is_well, predictive, not _memory(posterior, record))
+    against += [*_prior_dominated(result, known=beyond), *_going_back(result)]
+    has_band = is_well and result.family != GAUGE and "events" in posterior.children
+    budget = budget_if_any(posterior) if has_band else None
+    if budget is not None:
+        against.append(_width_of_band(budget))
+    return Check(tuple(against), is_well, predictive, not result.memory, budget)
+
+
+def probability_of(posterior: xr.DataTree) -> float:
+    """Return the probability of bands and intervals of a run."""
+    return float(posterior.attrs.get("probability", _USUAL))
+
+
+def budget_if_any(posterior: xr.DataTree) -> xr.Dataset | None:
+    """Return what sets the width of the band, or None where there is none."""
+    try:
+        return uncertainty_budget(posterior, probability_of(posterior))
+    except InferenceError:  # the rod touches none of its contours
+        return None
 
 
 def _p_value(predictive: xr.Dataset) -> str:
@@ -241,52 +272,36 @@ def _p_value(predictive: xr.Dataset) -> str:
     return f"{p_value:.2g}" + f", still above the {alarm:.2g} of disagreement" * (p_value < _SMALL)
 
 
-def _width_of_band(posterior: xr.DataTree) -> list[Finding]:
+def _width_of_band(budget: xr.Dataset) -> Finding:
     """Report what sets the width of the contour's band."""
-    if posterior.attrs.get("family", GAUGE) == GAUGE or "events" not in posterior.children:
-        return []
-    probability = float(posterior.attrs.get("probability", 0.95))
-    try:
-        budget = uncertainty_budget(posterior, probability)
-    except InferenceError:  # the rod touches none of its contours
-        return []
-    unit = str(budget.half_width.attrs["units"])
-    width, alone, shape = (
-        float(budget[name]) for name in ("half_width", "half_width_if_all_known", "half_width_of_shape")
-    )
-    known = ""
+    unit, known = str(budget.half_width.attrs["units"]), ""
+    names = ("half_width", "half_width_if_all_known", "half_width_of_shape")
+    width, alone, shape = (float(budget[name]) for name in names)
     if alone < _NARROWER * width:
-        least = int(np.argmin(budget.half_width_if_known.values))
-        name, narrowed = str(budget.unknown[least].values), float(budget.half_width_if_known[least])
-        one = f"with {name} known it would be ± {quantity(narrowed, unit)}, " * (narrowed < _NARROWER * width)
-        known = f"; {one}with all of the rig, as by a gauge, ± {quantity(alone, unit)}"
+        least = budget.isel(unknown=int(np.argmin(budget.half_width_if_known.values)))
+        narrowed = float(least.half_width_if_known)
+        one = f"with {least.unknown.item()} known it would be ± {quantity(narrowed, unit)}, "
+        known = f"; {one * (narrowed < _NARROWER * width)}with all of the rig, as by a gauge, ± {quantity(alone, unit)}"
     said = {"width": quantity(width, unit), "shape": quantity(shape, unit), "known": known}
-    return [Finding("width of the band", share=100.0 * probability, **said)]
+    return Finding("width of the band", share=100.0 * float(budget.attrs["probability"]), **said)
 
 
-def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[Finding]:
+def _going_back(result: _Result) -> list[Finding]:
     """Report sweeps about a pivot that go back in contact, where friction acts the other way, without a way forth.
 
     If all seem to, it is the sign of the moment.
     """
-    if not (is_inferred("friction", _inferred(posterior)) or posterior.attrs.get("friction", 0.0)):
+    record = result.record
+    if not (is_inferred("friction", result.inferred) or result.posterior.attrs.get("friction", 0.0)):
         return []
     backward = contact_sides(record) < 0.0
     back = backward != (record["direction"].values == "backward")
     if not back.any() or back.all():
         return []
-    history = drive_histories(record, backward, LoadCell.from_record(record) or LoadCell(), rubs=True)
+    history = drive_histories(record, backward, result.cell, rubs=True)
     sweeps = sorted(set(record["sweep"].values[back & (history == 0)].tolist()))
-    if not sweeps:
-        return []
-    entry = rig_entry("friction", 0, "unknown")
-    return [Finding("no way forth", sweeps=of_sweeps(sweeps, "go", past="went back"), entry=entry)]
-
-
-def _inferred(posterior: xr.DataTree) -> list[str]:
-    """Return the unknowns of the rig of a run."""
-    names: list[str] = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
-    return names
+    said = {"sweeps": of_sweeps(sweeps, "go", past="went back"), "entry": rig_entry("friction", 0, "unknown")}
+    return [Finding("no way forth", **said)] * bool(sweeps)
 
 
 def doubtful_sides(attrs: Mapping[Any, Any]) -> list[Finding]:
@@ -317,47 +332,42 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
     return zero_off(off, f"Take it out of the readings{how}, or give LoadCell.from_zero_load(record).")
 
 
-def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[Finding]:
+def _moved_zero(result: _Result, found: xr.Dataset) -> list[Finding]:
     """Report channels whose zero moved although neither drift nor play is stated or inferred."""
-    cell = LoadCell.from_record(record)
-    if (cell is not None and cell.drift is not None) or "play" in _memory(posterior, record):
+    if result.cell.drift is not None or "play" in result.memory:
         return []
     p_values = dict(zip(found.channel.values.tolist(), found.same_bias_p_value.values.tolist(), strict=True))
-    inferred = {name.removesuffix("_drift") for name in _inferred(posterior)}
+    inferred = {name.removesuffix("_drift") for name in result.inferred}
     known = {name for name in CHANNELS if name.removeprefix("holding_") in inferred}
     return moved_zero(p_values, found.attrs["false_alarm"], known)
 
 
-def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> Finding:
-    score = check.score.fillna(-np.inf)
-    place = score.argmax(("discrepancy", "channel"))
-    channel, cause = (str(score[dim].values[int(place[dim])]) for dim in ("channel", "discrepancy"))
-    worst = check.sel(channel=channel)
+def _not_described(result: _Result, check: xr.Dataset) -> Finding:
+    place = check.score.fillna(-np.inf).argmax(("discrepancy", "channel"))
+    channel, cause = (str(check[dim].values[int(place[dim])]) for dim in ("channel", "discrepancy"))
+    worst, predictions = check.sel(channel=channel), check.attrs["predictions"]
     residual = float(worst.worst_residual)
-    family, predictions = posterior.attrs.get("family", GAUGE), check.attrs["predictions"]
-    described, result = ("gauge", "rig") if family == GAUGE else (f"family {family}", "contour")
     # The share of predictions alone: the record itself is no prediction.
     like = round(float(check.overall_p_value) * (predictions + 1)) - 1
+    friction = result.posterior.attrs.get("friction", 0.0)
     return Finding(
         "not described",
-        family=described,
+        family="gauge" if result.family == GAUGE else f"family {result.family}",
         like=like or "none",
         predictions=predictions,
         are="are" if like > 1 else "is",
         channel=channel,
         cause=_CAUSES[cause],
         sweep=int(worst.worst_sweep),
-        stretch=_stretch(posterior, worst),
+        stretch=_stretch(result.record, worst),
         residual="+" * (residual > 0.0) + quantity(residual, str(worst.unit.values)),
-        result=result,
-        advice=likely_causes(posterior)
-        or what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0)),
+        result="rig" if result.family == GAUGE else "contour",
+        advice=likely_causes(result.posterior) or what_to_try([result.family], result.inferred, friction=friction),
     )
 
 
-def _stretch(posterior: xr.DataTree, worst: xr.Dataset) -> str:
+def _stretch(record: xr.Dataset, worst: xr.Dataset) -> str:
     """Return drive angles, or travels of a base that is carried, from the beginning to the end of a stretch."""
-    record = record_of(posterior)
     if int(worst.worst_sweep) not in carried_sweeps(record):
         return f"{math.degrees(worst.worst_from):.1f}° to {math.degrees(worst.worst_to):.1f}°"
     unit = str(record["base_x"].attrs.get("units", "1"))
@@ -365,26 +375,21 @@ def _stretch(posterior: xr.DataTree, worst: xr.Dataset) -> str:
     return f"{begin} to {end}{' L' * (unit == '1')} of travel"
 
 
-def _neighbours_over_stated(record: xr.Dataset, check: xr.Dataset) -> float:
+def _neighbours_over_stated(cell: LoadCell, check: xr.Dataset) -> float:
     """Return the scatter of neighbouring samples over the stated noise, the median of the channels; 1 if unknown.
 
     No more of the misfit than that can be noise.
     """
-    cell = LoadCell.from_record(record) or LoadCell()
-    stated = np.hypot(list(cell.standard_deviations.values()), cell.resolution / math.sqrt(12.0))
-    ratios = [
-        float(check.neighbour_noise.sel(channel=name)) / stated[CHANNELS.index(name)]
-        for name in check.channel.values
-        if 0.0 < stated[CHANNELS.index(name)] < math.inf
-    ]
+    stated = dict(zip(CHANNELS, np.hypot([*cell.standard_deviations.values()], cell.resolution / 12**0.5), strict=True))
+    found = check.neighbour_noise
+    ratios = [float(found.sel(channel=n)) / stated[n] for n in check.channel.values if 0.0 < stated[n] < math.inf]
     return float(np.median(ratios)) if ratios else 1.0
 
 
-def _noise(posterior: xr.DataTree, noisier: float) -> list[Finding]:
-    draws = posterior_draws(posterior)
-    if "noise_scale" not in draws:
+def _noise(result: _Result, noisier: float) -> list[Finding]:
+    if "noise_scale" not in result.draws:
         return []
-    factor = float(draws["noise_scale"].median())
+    factor = float(result.draws["noise_scale"].median())
     if 1.0 / NOISE_FACTOR <= factor <= NOISE_FACTOR:
         return []
     if noisier < 0.5 * factor and factor > NOISE_FACTOR:
@@ -393,54 +398,40 @@ def _noise(posterior: xr.DataTree, noisier: float) -> list[Finding]:
     return [Finding("larger noise", factor=f"{factor:.3g}")]
 
 
-def _contradictions(
-    posterior: xr.DataTree, record: xr.Dataset, contacts: xr.Dataset | None, noisier: float
-) -> list[Finding]:
+def _contradictions(result: _Result, contacts: xr.Dataset | None, noisier: float) -> list[Finding]:
     """Report loads of single samples that contradict one another, under normal noise; outliers enlarge misfits."""
-    cell = LoadCell.from_record(record) or LoadCell()
-    if contacts is None or math.isfinite(cell.degrees_of_freedom) or _memory(posterior, record):
+    if contacts is None or math.isfinite(result.cell.degrees_of_freedom) or result.memory:
         return []  # Step 2 knows of no memory
-    chance = float(contacts.attrs.get("misfit_probability", math.nan))
+    chance, score = (float(contacts.attrs.get(name, math.nan)) for name in ("misfit_probability", "axial_score"))
     if not chance < CONTRADICTION or noisier > 0.75 * NOISE_FACTOR:  # more noise than stated explains it
         return []
-    dragging = _dragging(posterior, float(contacts.attrs.get("axial_score", math.nan)))
+    dragging = ""
+    if score < -AXIAL_ALARM:
+        friction = f"friction: infer it ({rig_entry('friction', 'default', 'unknown')})"
+        if is_inferred("friction", result.inferred):
+            friction = "more friction than was inferred"
+        off = f"the force along the rod is too small by {-score:.0f} standard errors"
+        dragging = f" In tangential contact {off}, as with {friction}."
     return [contradiction(chance, dragging)]
 
 
-def _memory(posterior: xr.DataTree, record: xr.Dataset) -> set[str]:
-    """Return the kinds of memory that are stated, known or inferred."""
-    stated = sensor_values(LoadCell.from_record(record) or LoadCell())
-    return memory_in(stated, known_of(posterior.attrs), dict.fromkeys(_inferred(posterior), True))
-
-
-def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
-    """Return a sentence on the force along the rod where friction explains it."""
-    if not axial_score < -AXIAL_ALARM:
-        return ""
-    words = f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
-    if is_inferred("friction", _inferred(posterior)):
-        return f"{words}with more friction than was inferred."
-    return f"{words}with friction: infer it ({rig_entry('friction', 'default', 'unknown')})."
-
-
-def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
+def _beyond_prior(result: _Result) -> dict[str, str]:
     """Return parameters whose posterior lies where the prior has almost no mass, each with its values as text.
 
     A zero that was not tared is ordinary: it is left out where the record determines it, so that the prior moves it
     little.
     """
-    draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
-    said = {}
-    for name in draws.data_vars:
+    prior, said = result.posterior["prior"].to_dataset(), {}
+    for name, values in result.draws.data_vars.items():
         believed = prior[name].values.ravel()
         if name in _NOISES or believed.size < _FEWEST_PRIOR_DRAWS:
             continue
-        median = float(draws[name].median())
-        least, low, high, most = np.quantile(believed, [0.0, 0.05, 0.95, 1.0])
-        if name in _ZEROS and _pull(draws[name].values, believed) < _PULL:
+        if name in _ZEROS and _pull(values.values, believed) < _PULL:
             continue
+        median = float(values.median())
+        least, low, high, most = np.quantile(believed, [0.0, 0.05, 0.95, 1.0])
         if not least - _BEYOND * (low - least) <= median <= most + _BEYOND * (most - high):
-            unit = str(draws[name].attrs.get("units", "1"))
+            unit = str(values.attrs.get("units", "1"))
             middle, first, last = (quantity(value, unit) for value in (median, least, most))
             said[str(name)] = f"{name} = {middle} (prior: {first} to {last})"
     return said
@@ -452,27 +443,24 @@ def _pull(values: Floats, believed: Floats) -> float:
     return 2.0 * away * _width(values) / max(_width(believed), np.finfo(float).tiny) ** 2
 
 
-def _beyond_findings(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr.DataTree) -> list[Finding]:
-    if not beyond:
-        return []
-    draws = posterior_draws(posterior)
+def _beyond_findings(beyond: Mapping[str, str], result: _Result) -> list[Finding]:
     zeros = {
-        column: column_entry(record[column], added=-float(draws[name].median()))
+        column: column_entry(result.record[column], added=-float(result.draws[name].median()))
         for name, column in _COLUMN_OF_ZERO.items()
         if name in beyond
     }
     is_known = bool(zeros) and all(zeros.values())
     subtract = f"subtract a zero as its column is read ({rig_entries(zeros)}), " if is_known else ""
-    return [Finding("beyond the prior", values=", ".join(beyond.values()), subtract=subtract)]
+    return [Finding("beyond the prior", values=", ".join(beyond.values()), subtract=subtract)] * bool(beyond)
 
 
-def _cut_off(posterior: xr.DataTree) -> list[Finding]:
+def _cut_off(result: _Result) -> list[Finding]:
     """Report parameters that are cut off where the model has no equilibria."""
-    draws, quantile = posterior_draws(posterior), {"above": 1.0, "below": 0.0}
-    ends = [
-        f"{name} ({end} {quantity(float(draws[name].quantile(quantile[end])), draws[name].attrs.get('units', '1'))})"
-        for name, end in cut_off_parameters(posterior).items()
-    ]
+    quantile, ends = {"above": 1.0, "below": 0.0}, []
+    for name, end in cut_off_parameters(result.posterior).items():
+        values = result.draws[name]
+        last = quantity(float(values.quantile(quantile[end])), values.attrs.get("units", "1"))
+        ends.append(f"{name} ({end} {last})")
     return [Finding("cut-off posterior", ends=", ".join(ends))] * bool(ends)
 
 
@@ -484,12 +472,11 @@ def _smooth(predictive: xr.Dataset) -> list[Finding]:
     return [Finding("smooth misfit", channels=" and ".join(named), entry=entry)] * bool(named)
 
 
-def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[Finding]:
-    draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
-    family = posterior.attrs.get("family", GAUGE)
-    asked = set(map(str, draws.data_vars))
-    if family != GAUGE:
-        asked = {*family_named(family).parameters} - {*family_named(family).roughness}
+def _prior_dominated(result: _Result, known: Container[str]) -> list[Finding]:
+    draws, prior = result.draws, result.posterior["prior"].to_dataset()
+    asked = {*map(str, draws.data_vars)}
+    if result.family != GAUGE:
+        asked = {*family_named(result.family).parameters} - {*family_named(result.family).roughness}
     names = [str(name) for name in draws.data_vars if name in asked and name not in known and name not in _NOISES]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
     return [Finding("set by the prior", names=", ".join(names))] * bool(names)

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.record import CHANNELS, frame_of
+from tactile_bayes.record import frame_of
 from tactile_bayes.record.origin import column_entry
 from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
@@ -46,11 +46,12 @@ def corrections_for(record: xr.Dataset, friction: float) -> list[Correction]:
         ("force_x and force_y were exchanged", _exchanged),
         (_FRAME_TEXTS[other], lambda record: record.assign_attrs(load_cell_frame=other)),
     ]
-    found = [Correction(text, apply, friction) for text, apply in simple]
-    for coefficient in _FRICTIONS:
-        text = f"there were friction of about {coefficient:g} (have infer find it, which is the default)"
-        found.append(Correction(text, as_it_is, coefficient))
-    return [*found, *(Correction(text, apply, friction, changes) for text, apply, changes in _angles(record))]
+    rubs = "there were friction of about {:g} (have infer find it, which is the default)"
+    return [
+        *(Correction(text, apply, friction) for text, apply in simple),
+        *(Correction(rubs.format(coefficient), as_it_is, coefficient) for coefficient in _FRICTIONS),
+        *(Correction(text, apply, friction, changes) for text, apply, changes in _angles(record)),
+    ]
 
 
 def _entries(record: xr.Dataset, *names: str, sense: int = -1, added: float = 0.0) -> str:
@@ -64,15 +65,12 @@ def as_it_is(record: xr.Dataset) -> xr.Dataset:
 
 
 def _with_sign(*names: str) -> Transform:
-    def turned_round(record: xr.Dataset) -> xr.Dataset:
-        return record.assign({name: (record[name].dims, -record[name].values, record[name].attrs) for name in names})
-
-    return turned_round
+    return lambda record: record.assign({name: record[name].copy(data=-record[name].values) for name in names})
 
 
 def _exchanged(record: xr.Dataset) -> xr.Dataset:
-    x, y = record[CHANNELS[1]], record[CHANNELS[2]]
-    return record.assign({x.name: (x.dims, y.values, x.attrs), y.name: (y.dims, x.values, y.attrs)})
+    x, y = record["force_x"], record["force_y"]
+    return record.assign(force_x=x.copy(data=y.values), force_y=y.copy(data=x.values))
 
 
 def _in_turn(*transforms: Transform) -> Transform:
@@ -88,8 +86,7 @@ def _counted(sense: int, turns: float) -> Transform:
         angles = 0.5 * np.pi * turns + sense * drive.values
         angles -= 2.0 * np.pi * np.round(0.25 * (angles.min() + angles.max()) / np.pi)
         counted = record.assign(
-            drive_angle=(drive.dims, angles, drive.attrs),
-            direction=(way.dims, way.values if sense > 0 else others, way.attrs),
+            drive_angle=drive.copy(data=angles), direction=way.copy(data=way.values if sense > 0 else others)
         )
         return counted.isel(sample=np.abs(angles) < LARGEST_DRIVE_ANGLE)  # those beyond carry no load
 

@@ -26,7 +26,6 @@ UNFIT = 0.25
 _FAR = 3.0  # standard deviations of a bias's prior beyond which `check` would report the bias
 _CORRELATED = 0.2  # autocorrelation of neighbours below which noise counts as white
 _FEWEST_IN_CONTACT = 10
-_DRIFT = rig_entry("drift", "default", "unknown")
 _UNITS = {"large loads", "small loads", "long lever"}
 
 
@@ -37,24 +36,31 @@ def inspection_findings(
     samples: xr.Dataset,
     of_loads: Sequence[Finding],
     fit: Fit,
-    cell: LoadCell | None,
-    source: str,
+    stated: LoadCell | None,
     false_alarm: float,
 ) -> tuple[Finding, ...]:
-    """Return the findings of `inspect_record`; none if nothing looks wrong."""
+    """Return the findings of `inspect_record` with the load cell that is stated; none if nothing looks wrong."""
     return (
-        *([] if sweeps.contact.values.any() else [Finding("no contact")]),
-        *_dead(record, sweeps),
+        *_untouched(record, sweeps),
         *_loads(of_loads, fit),
-        *_cut_off(record, samples, cell),
+        *_cut_off(record, samples, stated),
         *_without_contact(sweeps),
-        *_stuck(samples),
-        *_outlying(samples, cell),
-        *_zeros(record, channels, cell, source, false_alarm),
-        *_noise(channels, cell, source, false_alarm),
+        *(Finding("stuck", **words) for _, words in _of_channels(samples, "stuck")),
+        *_stored_twice(samples),
+        *_outlying(samples, stated),
+        *_zeros(record, channels, stated, false_alarm),
+        *_noise(channels, stated, false_alarm),
         *_steps(samples),
         *_unfinished(sweeps),
     )
+
+
+def _untouched(record: xr.Dataset, sweeps: xr.Dataset) -> list[Finding]:
+    """Report that there is no contact, or else the channels that never change."""
+    if not sweeps.contact.values.any():
+        return [Finding("no contact")]
+    names = [name for name in present_channels(record) if np.ptp(record[name].values) == 0.0]
+    return [Finding("dead channel", channel=name, entry=rig_entry("missing", [name])) for name in names]
 
 
 def _loads(of_loads: Sequence[Finding], fit: Fit) -> list[Finding]:
@@ -73,13 +79,6 @@ def _loads(of_loads: Sequence[Finding], fit: Fit) -> list[Finding]:
     return found
 
 
-def _dead(record: xr.Dataset, sweeps: xr.Dataset) -> list[Finding]:
-    if not sweeps.contact.values.any():
-        return []
-    names = [name for name in present_channels(record) if np.ptp(record[name].values) == 0.0]
-    return [Finding("dead channel", channel=name, entry=rig_entry("missing", [name])) for name in names]
-
-
 def _of_channels(samples: xr.Dataset, flags: str) -> Iterator[tuple[Flags, dict[str, str]]]:
     """Yield the flagged samples of each channel that has some, and the words on them."""
     for index, name in enumerate(CHANNELS):
@@ -89,96 +88,80 @@ def _of_channels(samples: xr.Dataset, flags: str) -> Iterator[tuple[Flags, dict[
             yield flagged, words | {"are": "is" if np.sum(flagged) == 1 else "are"}
 
 
-def _cut_off(record: xr.Dataset, samples: xr.Dataset, cell: LoadCell | None) -> list[Finding]:
+def _cut_off(record: xr.Dataset, samples: xr.Dataset, stated: LoadCell | None) -> list[Finding]:
     found = []
     for flagged, words in _of_channels(samples, "cut_off"):
-        name = words["channel"]
-        largest = float(np.abs(record[name].values[flagged]).max())
-        stated = cell is not None and np.isfinite(cell.limit[CHANNELS.index(name)])
-        advice = "" if stated else ": state its end in the header, or take a cell with a larger one"
-        unit = str(record[name].attrs.get("units", "1"))
-        found.append(Finding("cut off", largest=quantity(largest, unit), advice=advice, **words))
+        column = record[words["channel"]]
+        largest = quantity(float(np.abs(column.values[flagged]).max()), str(column.attrs.get("units", "1")))
+        is_known = stated is not None and np.isfinite(stated.limit[CHANNELS.index(words["channel"])])
+        advice = "" if is_known else ": state its end in the header, or take a cell with a larger one"
+        found.append(Finding("cut off", largest=largest, advice=advice, **words))
     return found
 
 
 def _without_contact(sweeps: xr.Dataset) -> list[Finding]:
-    none = [int(number) for number, found in zip(sweeps.sweep.values, sweeps.contact.values, strict=True) if not found]
+    none = sweeps.sweep.values[~sweeps.contact.values].tolist()
     some = 0 < len(none) < sweeps.sizes["sweep"]
     return [Finding("sweep without contact", sweeps=of_sweeps(none, "show"))] if some else []
 
 
-def _stuck(samples: xr.Dataset) -> list[Finding]:
-    found = [Finding("stuck", **words) for _, words in _of_channels(samples, "stuck")]
+def _stored_twice(samples: xr.Dataset) -> list[Finding]:
     flags = samples.repeated.values
-    if flags.any():
-        have = "has" if np.sum(flags) == 1 else "have"
-        found.append(Finding("stored twice", count=counted(flags, "sample"), have=have, samples=listed(flags)))
-    return found
+    if not flags.any():
+        return []
+    have = "has" if np.sum(flags) == 1 else "have"
+    return [Finding("stored twice", count=counted(flags, "sample"), have=have, samples=listed(flags))]
 
 
-def _outlying(samples: xr.Dataset, cell: LoadCell | None) -> list[Finding]:
+def _outlying(samples: xr.Dataset, stated: LoadCell | None) -> list[Finding]:
     entry = rig_entry("degrees_of_freedom", 4, "load_cell")
     advice = f"If there are more, state noise with outliers ({entry}); else remove the row."
-    if cell is not None and np.isfinite(cell.degrees_of_freedom):
+    if stated is not None and np.isfinite(stated.degrees_of_freedom):
         advice = "The noise with outliers that is stated allows for some; else remove the row."
-    return [
-        Finding(
-            "outlier",
-            stand="stands" if words["are"] == "is" else "stand",
-            their="its" if words["are"] == "is" else "their",
-            advice=advice,
-            **words,
-        )
-        for _, words in _of_channels(samples, "outlier")
-    ]
+    forms = {"is": {"stand": "stands", "their": "its"}, "are": {"stand": "stand", "their": "their"}}
+    every = [words for _, words in _of_channels(samples, "outlier")]
+    return [Finding("outlier", advice=advice, **forms[words["are"]], **words) for words in every]
 
 
-def _zeros(
-    record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float
-) -> list[Finding]:
+def _zeros(record: xr.Dataset, channels: xr.Dataset, stated: LoadCell | None, false_alarm: float) -> list[Finding]:
     found = []
-    if not _drifts(cell):
+    if not _drifts(stated):
         p_values = dict(zip(channels.channel.values.tolist(), channels.same_bias_p_value.values.tolist(), strict=True))
         found += moved_zero(p_values, false_alarm)
-    is_stated = source in ("given", "data sheet")
-    far = far_off(record, channels, cell if is_stated else None)
+    far = far_off(record, channels, stated)
     if far:
-        zeros = {str(row.channel.values): float(row.bias) for row in _rows(channels)}
-        entries = {name: column_entry(record[name], added=-zeros[name]) for name in far}
+        entries = {name: column_entry(record[name], added=-float(channels.bias.sel(channel=name))) for name in far}
         how = f"as the column is read: {rig_entries(entries)}" if all(entries.values()) else "from the readings"
         found.append(Finding("far zero", zeros=joined(list(far.values())), how=how))
-    if not is_stated or _drifts(cell):
+    if stated is None or _drifts(stated):
         return found
     off = {}
     for row in _rows(channels):
         name = str(row.channel.values)
-        stated = 0.0 if cell is None else cell.bias_uncertainty[CHANNELS.index(name)]
         if name not in far:
-            error = float(np.hypot(float(row.bias_uncertainty), stated))
+            error = float(np.hypot(float(row.bias_uncertainty), stated.bias_uncertainty[CHANNELS.index(name)]))
             off[name] = float(row.bias - row.stated_bias), error, str(row.unit.values)
     advice = "infer finds it as it is (bias, one of the defaults), unless the rig says that it is known."
     return [*found, *zero_off(off, advice)]
 
 
-def far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) -> dict[str, str]:
+def far_off(record: xr.Dataset, channels: xr.Dataset, stated: LoadCell | None) -> dict[str, str]:
     """Return, by channel and as text, zeros that the prior of a bias hardly allows and that no cell states."""
-    rod, found = rod_of(record), {}
+    rod, cell, found = rod_of(record), stated or LoadCell(), {}
     for row in _rows(channels):
         name, bias = str(row.channel.values), float(row.bias)
         index = CHANNELS.index(name)
-        stated, uncertain = (0.0, 0.0) if cell is None else (cell.bias[index], cell.bias_uncertainty[index])
-        expected = PARAMETERS["moment_bias"].width * (rod.moment_unit if name == CHANNELS[0] else rod.force_unit)
-        if abs(bias - stated) > _FAR * max(expected, uncertain):
+        expected = PARAMETERS["moment_bias"].width * rod.load_units[index]
+        if abs(bias - cell.bias[index]) > _FAR * max(expected, cell.bias_uncertainty[index]):
             found[name] = f"{quantity(bias, str(row.unit.values))} of {name}"
     return found
 
 
-def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float) -> list[Finding]:
-    if _drifts(cell):
+def _noise(channels: xr.Dataset, stated: LoadCell | None, false_alarm: float) -> list[Finding]:
+    if _drifts(stated):
         return []
-    found = []
     level = -float(ndtri(0.5 * false_alarm / len(CHANNELS)))
-    apart, alike = [], []
+    apart, alike, unlike = [], [], []
     for row in _rows(channels):
         name, unit = str(row.channel.values), str(row.unit.values)
         if float(row.position_p_value) < false_alarm / len(CHANNELS):
@@ -186,29 +169,26 @@ def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
             apart.append(f"{name} ({scatter} instead of {usual})")
         elif abs(float(row.neighbour_score)) > level and abs(float(row.neighbour_correlation)) > _CORRELATED:
             alike.append(f"{name} ({float(row.neighbour_correlation):+.2f})")
-    for channels_, how, advice in (
-        (
-            apart,
-            "the means of unloaded positions scatter more than single readings explain, in",
-            "Give the mean of each position as one sample",
-        ),
+        noise, error, expected = (float(row[key]) for key in ("noise", "noise_uncertainty", "stated_noise"))
+        is_as_stated = 1.0 / NOISE_FACTOR <= noise / expected <= NOISE_FACTOR
+        if not is_as_stated and abs(noise - expected) > OFF_ZERO * error:  # false without a stated noise, NaN
+            real, said = quantity(noise, unit), quantity(expected, unit)
+            unlike.append(Finding("noise not as stated", channel=name, found=real, stated=said))
+    scattered = "the means of unloaded positions scatter more than single readings explain, in"
+    ways = (
+        (apart, scattered, "Give the mean of each position as one sample"),
         (alike, "unloaded neighbours are correlated in", "Filter less or sample less often"),
-    ):
-        if channels_:
-            found.append(Finding("noise not white", how=f"{how} {joined(channels_)}", advice=advice, entry=_DRIFT))
-    if source in ("given", "data sheet"):
-        for row in _rows(channels):
-            noise, error, expected = (float(row[name]) for name in ("noise", "noise_uncertainty", "stated_noise"))
-            ratio = noise / expected if expected else np.nan
-            if not 1.0 / NOISE_FACTOR <= ratio <= NOISE_FACTOR and abs(noise - expected) > OFF_ZERO * error:
-                real, stated = (quantity(value, str(row.unit.values)) for value in (noise, expected))
-                found.append(Finding("noise not as stated", channel=str(row.channel.values), found=real, stated=stated))
-    return found
+    )
+    entry = rig_entry("drift", "default", "unknown")
+    return [
+        *(Finding("noise not white", how=f"{how} {joined(n)}", advice=a, entry=entry) for n, how, a in ways if n),
+        *unlike,
+    ]
 
 
-def _drifts(cell: LoadCell | None) -> bool:
+def _drifts(stated: LoadCell | None) -> bool:
     """Return True if a drift is stated, which explains a zero that moves and correlated neighbours."""
-    return cell is not None and cell.drift is not None
+    return stated is not None and stated.drift is not None
 
 
 def _steps(samples: xr.Dataset) -> list[Finding]:
@@ -221,19 +201,15 @@ def _steps(samples: xr.Dataset) -> list[Finding]:
 
 def _unfinished(sweeps: xr.Dataset) -> list[Finding]:
     contact = sweeps.contact.values
-    event = {"begin": "onset_drive_angle", "end": "snap_off_drive_angle"}
-    inside = {
-        verb: contact & np.isnan(sweeps[name].sel(side=["before", "after"]).values).all(axis=-1)
-        for verb, name in event.items()
-    }
+    begins, ends = (
+        contact & np.isnan(sweeps[f"{event}_drive_angle"].sel(side=["before", "after"]).values).all(axis=-1)
+        for event in ("onset", "snap_off")
+    )
     few = contact & (sweeps.samples.values - sweeps.unloaded.values < _FEWEST_IN_CONTACT)
+    kinds = ("begins in contact", "begin", begins), ("ends in contact", "end", ends), ("few samples", "show", few)
     return [
         Finding(kind, sweeps=of_sweeps(sweeps.sweep.values[flags].tolist(), verb), fewest=_FEWEST_IN_CONTACT)
-        for kind, verb, flags in (
-            ("begins in contact", "begin", inside["begin"]),
-            ("ends in contact", "end", inside["end"]),
-            ("few samples", "show", few),
-        )
+        for kind, verb, flags in kinds
         if flags.any()
     ]
 

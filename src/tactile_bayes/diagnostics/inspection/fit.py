@@ -48,11 +48,9 @@ def fit_of(found: Corrected, *, most: float, progress: Callable[[int, int], obje
     alone = _of_any_samples(cell, record.sizes["sample"])
 
     def share_if(correction: Correction) -> float:
-        return sum(_shares(contacts_of(as_if(correction), "constrained"))[:2])
-
-    def as_if(correction: Correction) -> Corrected:
         read = _read_by(alone, correction.apply(loads))
-        return found._replace(record=read, load_cell=alone, friction=correction.friction)
+        otherwise = found._replace(record=read, load_cell=alone, friction=correction.friction)
+        return sum(_shares(contacts_of(otherwise, "constrained"))[:2])
 
     corrections = corrections_for(loads, found.friction)
     progress(0, len(corrections))
@@ -61,9 +59,7 @@ def fit_of(found: Corrected, *, most: float, progress: Callable[[int, int], obje
     for correction in corrections:
         left.append(share_if(correction))
         progress(len(left), len(corrections))
-    best = int(
-        np.argmin([over + _CHANGE * correction.changes for over, correction in zip(left, corrections, strict=True)])
-    )
+    best = int(np.argmin(np.add(left, [_CHANGE * correction.changes for correction in corrections])))
     return Fit(share, below, loaded, corrections[best].text if left[best] <= _CORRECTED * part else "")
 
 
@@ -95,6 +91,4 @@ def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
 def _read_by(cell: LoadCell, loads: xr.Dataset) -> xr.Dataset:
     """Return the loads as a noise-free cell would read them, so that the cell's noise is in proportion to them."""
     read = cell.expected(np.stack([loads[name].values for name in CHANNELS], axis=-1))
-    return loads.assign(
-        {name: (loads[name].dims, read[:, index], loads[name].attrs) for index, name in enumerate(CHANNELS)}
-    )
+    return loads.assign({name: loads[name].copy(data=read[:, index]) for index, name in enumerate(CHANNELS)})

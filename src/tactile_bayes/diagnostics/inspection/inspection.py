@@ -34,6 +34,8 @@ _STEPS = 3
 _MOVED = 1e-3  # probability that a zero which stays where it is seems to have moved as far between unloaded stretches
 _DIGITS = 3  # number of significant digits of a noise that is estimated
 
+_STATED = ("given", "data sheet")  # sources of a load cell that somebody states
+
 CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"]
 
 
@@ -159,10 +161,11 @@ def inspect_record(
         warnings.simplefilter("ignore", DriftWarning)  # a message reports it
         found = zero_load(record, false_alarm=false_alarm)
         cell, source = known_cell(record, rig.load_cell)
+    stated = cell if source in _STATED else None
     sweeps = rows_of_sweeps(record["sweep"].values)
     stretches = unloaded_stretches(sweeps, found["unloaded"].values)
-    channels = channel_table(record, found, stretches, cell if source in ("given", "data sheet") else None)
-    samples = sample_table(record, found, sweeps, stretches, cell, false_alarm=false_alarm)
+    channels = channel_table(record, found, stretches, stated)
+    samples = sample_table(record, found, sweeps, stretches, stated, false_alarm=false_alarm)
     report(1, _STEPS)
     statuses: dict[str, int] = {}
     fit = Fit(math.nan, math.nan, 0, "")
@@ -183,25 +186,22 @@ def inspect_record(
         samples["status"] = ("sample", np.full(record.sizes["sample"], ""), {"long_name": "none: a channel is missing"})
     table = sweep_table(record, found, sweeps)
     of_loads = unit_and_sign_findings(record, _with_zero(cell, found)) if found["contact"].values.any() else ()
-    against = inspection_findings(record, table, channels, samples, of_loads, fit, cell, source, false_alarm)
-    return Inspection(
-        record, against or (Finding("nothing wrong"),), bool(against), table, channels, samples, statuses, cell, source
-    )
+    against = inspection_findings(record, table, channels, samples, of_loads, fit, stated, false_alarm)
+    said = against or (Finding("nothing wrong"),)
+    return Inspection(record, said, bool(against), table, channels, samples, statuses, cell, source)
 
 
 def known_cell(measured: xr.Dataset, given: LoadCell | None = None) -> tuple[LoadCell | None, CellSource]:
     """Return the given load cell, or the record's data sheet, or an estimate from unloaded samples, and its source."""
     if given is not None:
         return given, "given"
-    stated = LoadCell.from_record(measured)
-    if stated is not None:
+    if (stated := LoadCell.from_record(measured)) is not None:
         return stated, "data sheet"
     try:
         found = LoadCell.from_zero_load(measured)
     except RecordError:
         return None, "too few unloaded samples"
-    present = present_channels(measured)
-    noisy = all(found.standard_deviations[name] for name in present)
+    noisy = all(found.standard_deviations[name] for name in present_channels(measured))
     return (found, "unloaded samples") if noisy else (None, "nothing")
 
 
@@ -209,9 +209,8 @@ def _with_zero(cell: LoadCell | None, found: xr.Dataset) -> LoadCell:
     """Return the load cell with the bias that the record shows; a message of its own reports a forgotten tare."""
     if not np.isfinite(found["bias"].values).any():
         return cell or LoadCell()
-    one, two, three = np.nan_to_num(found["bias"].values).tolist()
-    uncertainty = np.nan_to_num(found["bias_uncertainty"].values).tolist()
-    return replace(cell or LoadCell(), bias=(one, two, three), bias_uncertainty=tuple(uncertainty))
+    bias, uncertainty = (tuple(np.nan_to_num(found[name].values).tolist()) for name in ("bias", "bias_uncertainty"))
+    return replace(cell or LoadCell(), bias=bias, bias_uncertainty=uncertainty)
 
 
 def shown_rig(found: Inspection, rig: Rig) -> Rig:
@@ -223,17 +222,15 @@ def shown_rig(found: Inspection, rig: Rig) -> Rig:
     columns = {name: column_entry(found.record[name], added=-zero) for name, zero in _zeros(found)}
     columns = {name: text for name, text in columns.items() if text}
     rig = replace(rig, file=replace(rig.format, columns={**rig.format.columns, **columns}))
-    cell = found.load_cell
-    if found.load_cell_source != "unloaded samples" or cell is None:
+    if found.load_cell_source != "unloaded samples":
         return rig
-    force_noise, moment_noise = (float(f"{noise:.{_DIGITS}g}") for noise in (cell.force_noise, cell.moment_noise))
-    stated = rig.load_cell or LoadCell()
-    return replace(rig, load_cell=replace(stated, force_noise=force_noise, moment_noise=moment_noise))
+    noises = {name: float(f"{getattr(found.load_cell, name):.{_DIGITS}g}") for name in ("force_noise", "moment_noise")}
+    return replace(rig, load_cell=replace(rig.load_cell or LoadCell(), **noises))
 
 
 def _zeros(found: Inspection) -> Iterator[tuple[str, float]]:
     """Yield the channels whose zeros are off by many standard errors, or, beside a stated cell, more than it allows."""
-    is_stated = found.load_cell_source in ("given", "data sheet")
+    is_stated = found.load_cell_source in _STATED
     far = far_off(found.record, found.channels, found.load_cell if is_stated else None)
     for name in found.channels.channel.values.tolist():
         row = found.channels.sel(channel=name)

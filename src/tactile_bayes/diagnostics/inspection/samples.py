@@ -40,18 +40,16 @@ def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step:
     most = float(stats.t.isf(level, max(_EFFICIENCY * (residual.size - len(stretches)), 1.0))) * spread
     unloaded = np.concatenate(stretches)
     flags[unloaded] = np.abs(residual) > most
-    is_unloaded = np.zeros(reading.size, dtype=bool)
-    is_unloaded[unloaded] = True
+    is_loaded = ~np.isin(np.arange(reading.size), unloaded)
     for rows in sweeps:
         if rows.size < 5:
             continue
-        values = reading[rows]
-        windows = np.lib.stride_tricks.sliding_window_view(values, 5)
+        windows = np.lib.stride_tricks.sliding_window_view(reading[rows], 5)
         neighbours = windows[:, [0, 1, 3, 4]]
         highest, lowest = neighbours.max(axis=1), neighbours.min(axis=1)
         beyond = np.maximum(windows[:, 2] - highest, lowest - windows[:, 2])
         inner = rows[2:-2]
-        flags[inner[(beyond > _JUMP * (highest - lowest) + most) & ~is_unloaded[inner]]] = True
+        flags[inner] |= (beyond > _JUMP * (highest - lowest) + most) & is_loaded[inner]
     return flags
 
 
@@ -66,18 +64,12 @@ def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: f
     return max(by_steps, found)
 
 
-def _runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
-    """Return runs of two and more equal consecutive readings of a sweep, as rows of readings, shape (n_samples,)."""
-    parts = np.split(rows, np.flatnonzero(np.diff(reading[rows]) != 0.0) + 1)
-    return [part for part in parts if part.size > 1]
-
-
 def stuck(reading: Floats, sweeps: list[Index], chance: float, noise: float, *, false_alarm: float) -> Flags:
     """Flag readings, shape (n_samples,), that stay equal for longer than the limited resolution explains."""
     flags = np.zeros(reading.size, dtype=bool)
     chances = np.clip(_written_steps(reading) / (2.0 * math.sqrt(math.pi) * noise), chance, 1.0)
     for rows in sweeps:
-        for run in _runs_of_equals(reading, rows):
+        for run in np.split(rows, np.flatnonzero(np.diff(reading[rows])) + 1):
             if run.size >= _SHORTEST and reading.size * chances[run[0]] ** (run.size - 1) < false_alarm:
                 flags[run] = True
     return flags

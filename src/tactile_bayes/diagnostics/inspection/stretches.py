@@ -21,20 +21,12 @@ class Autocorrelation(NamedTuple):
     score: float  # coefficient in standard errors, about standard normal for white noise
 
 
-class PositionScatter(NamedTuple):
-    """Scatter of the means of unloaded positions; NaN where the drive does not stop, or positions are too few."""
-
-    found: float  # standard deviation about the mean of the stretch
-    expected: float  # the same if only the noise of single readings causes it
-    p_value: float  # p-value of the hypothesis that it does (analysis of variance)
-
-
 def unloaded_stretches(sweeps: list[Index], unloaded: Flags) -> list[Index]:
     """Return the rows of every stretch of consecutive unloaded samples; `unloaded` has shape (samples,)."""
     stretches = []
     for rows in sweeps:
         flags = unloaded[rows]
-        parts = np.split(rows, np.flatnonzero(np.diff(flags.astype(np.int8))) + 1)
+        parts = np.split(rows, np.flatnonzero(np.diff(flags)) + 1)
         stretches += [part for part in parts if part.size and unloaded[part[0]]]
     return stretches
 
@@ -42,7 +34,7 @@ def unloaded_stretches(sweeps: list[Index], unloaded: Flags) -> list[Index]:
 def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
     """Return unloaded readings less the median of their stretch, shape (n,), and their robust standard deviation."""
     residuals = [reading[rows] - np.median(reading[rows]) for rows in stretches]
-    together = np.concatenate(residuals) if residuals else np.zeros(0)
+    together = np.concatenate([np.zeros(0), *residuals])
     return together, robust_deviation(together)
 
 
@@ -68,8 +60,12 @@ def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
     return Autocorrelation(float(np.clip(value, -1.0, 1.0)), float(value * np.sqrt(pairs)))
 
 
-def position_scatter(reading: Floats, stretches: list[Index], positions: list[Index]) -> PositionScatter:
-    """Return the scatter of positions in all stretches, from readings, shape (samples,), and positions of each."""
+def position_scatter(reading: Floats, stretches: list[Index], positions: list[Index]) -> tuple[float, float, float]:
+    """Return the scatter of the means of unloaded positions, of readings of shape (samples,) and positions of each.
+
+    It is the standard deviation about the mean of the stretch, the same if only the noise of single readings causes it,
+    and the p-value of that (analysis of variance); NaN where the drive does not stop, or positions are too few.
+    """
     between, within, square, places, samples, groups = 0.0, 0.0, 0.0, 0, 0, 0
     for rows, stops in zip(stretches, positions, strict=True):
         means = means_of_positions(reading[rows], stops)
@@ -81,7 +77,7 @@ def position_scatter(reading: Floats, stretches: list[Index], positions: list[In
         places, samples, groups = places + means.size, samples + rows.size, groups + 1
     free, free_within = places - groups, samples - places
     if free < 1 or free_within < 1 or within <= 0.0:
-        return PositionScatter(np.nan, np.nan, np.nan)
+        return np.nan, np.nan, np.nan
     variance = within / free_within
     p_value = float(fdtrc(free, free_within, between / free / variance))
-    return PositionScatter(float(np.sqrt(square / free)), float(np.sqrt(variance * places / samples)), p_value)
+    return float(np.sqrt(square / free)), float(np.sqrt(variance * places / samples)), p_value

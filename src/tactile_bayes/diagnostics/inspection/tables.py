@@ -18,6 +18,15 @@ from tactile_bayes.record import (
     travels_of,
 )
 
+_FLAGS = {
+    "outlier": "whether the reading stands out from its neighbours",
+    "stuck": "whether the reading stays the same for long",
+    "cut_off": "whether the reading is at the end of a range",
+}
+_COLUMNS = (
+    *("smallest", "largest", "stated_noise", "stated_bias", "neighbour_correlation", "neighbour_score"),
+    *("position_noise", "position_noise_expected", "position_p_value"),
+)
 _FROM_ZERO_LOAD = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "resolution", "same_bias_p_value")
 
 
@@ -26,14 +35,14 @@ def sample_table(
     found: xr.Dataset,
     sweeps: list[Index],
     stretches: list[Index],
-    cell: LoadCell | None,
+    stated: LoadCell | None,
     *,
     false_alarm: float,
 ) -> xr.Dataset:
     """Return `Inspection.samples` without the status; `found` is the result of `zero_load`."""
     count, present = record.sizes["sample"], present_channels(record)
     level = false_alarm / len(present)
-    flags = {name: np.zeros((count, len(CHANNELS)), dtype=bool) for name in ("outlier", "stuck", "cut_off")}
+    flags = {name: np.zeros((count, len(CHANNELS)), dtype=bool) for name in _FLAGS}
     unloaded = found["unloaded"].values
     chances, readings = [], []
     for index, name in enumerate(CHANNELS):
@@ -52,8 +61,8 @@ def sample_table(
         at_end = equal & ~unloaded & ((reading == reading.max()) | (reading == reading.min()))
         flags["cut_off"][:, index] = at_end
         flags["stuck"][:, index] = equal & ~at_end
-    if cell is not None:
-        ends = cell.cuts_off(np.stack([record[name].values for name in CHANNELS], axis=-1))
+    if stated is not None:
+        ends = stated.cuts_off(np.stack([record[name].values for name in CHANNELS], axis=-1))
         flags["cut_off"] |= ends
         flags["stuck"] &= ~ends
     twice = np.zeros(count, dtype=bool)
@@ -63,19 +72,13 @@ def sample_table(
     uneven = np.zeros(count, dtype=bool)
     travels, carried = travels_of(record), carried_sweeps(record)
     for rows in sweeps:
-        turns_back = (
-            record["direction"].values[rows[0]] == "backward" and record["sweep"].values[rows[0]] not in carried
-        )
+        first = record.isel(sample=rows[0])
+        turns_back = first.direction.item() == "backward" and first.sweep.item() not in carried
         uneven[rows] = uneven_steps(travels, rows, -1 if turns_back else 1)
-    words = {
-        "outlier": "whether the reading stands out from its neighbours",
-        "stuck": "whether the reading stays the same for long",
-        "cut_off": "whether the reading is at the end of a range",
-    }
     return xr.Dataset(
         {
             "unloaded": ("sample", unloaded, {"long_name": "whether the sample is unloaded"}),
-            **{name: (("sample", "channel"), flags[name], {"long_name": words[name]}) for name in words},
+            **{name: (("sample", "channel"), flags[name], {"long_name": words}) for name, words in _FLAGS.items()},
             "repeated": ("sample", twice, {"long_name": "whether all readings are those of the sample before"}),
             "uneven_step": ("sample", uneven, {"long_name": "whether the step of the drive up to it is another"}),
         },
@@ -85,26 +88,20 @@ def sample_table(
 
 def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index], stated: LoadCell | None) -> xr.Dataset:
     """Return `Inspection.channels`; `found` is the result of `zero_load`."""
-    columns = {name: np.full(len(CHANNELS), np.nan) for name in ("smallest", "largest", "stated_noise", "stated_bias")}
-    likeness, apart = np.full((2, len(CHANNELS)), np.nan), np.full((3, len(CHANNELS)), np.nan)
+    columns = np.full((len(_COLUMNS), len(CHANNELS)), np.nan)
     travels = travels_of(record)
     positions = [positions_of(travels[rows]) for rows in stretches]
     for index, name in enumerate(CHANNELS):
         if name not in present_channels(record):
             continue
-        reading = record[name].values
-        columns["smallest"][index], columns["largest"][index] = reading.min(), reading.max()
-        likeness[:, index] = autocorrelation(reading, stretches)
-        apart[:, index] = position_scatter(reading, stretches, positions)
+        reading, noise, bias = record[name].values, np.nan, np.nan
         if stated is not None:
-            step = stated.resolution[index] / np.sqrt(12.0)
-            noise = float(np.hypot(stated.standard_deviations[name], step))
-            columns["stated_noise"][index] = noise if 0.0 < noise < np.inf else np.nan
-            columns["stated_bias"][index] = stated.bias[index]
-    columns["neighbour_correlation"], columns["neighbour_score"] = likeness
-    columns["position_noise"], columns["position_noise_expected"], columns["position_p_value"] = apart
+            noise = float(np.hypot(stated.standard_deviations[name], stated.resolution[index] / np.sqrt(12.0)))
+            noise, bias = noise if 0.0 < noise < np.inf else np.nan, stated.bias[index]
+        likeness, apart = autocorrelation(reading, stretches), position_scatter(reading, stretches, positions)
+        columns[:, index] = reading.min(), reading.max(), noise, bias, *likeness, *apart
     table = xr.Dataset(
-        {name: ("channel", values) for name, values in columns.items()},
+        {name: ("channel", values) for name, values in zip(_COLUMNS, columns, strict=True)},
         coords={"channel": list(CHANNELS), "unit": ("channel", found["unit"].values)},
         attrs={"units": record.attrs["units"]},
     )
@@ -114,12 +111,11 @@ def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index],
 def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> xr.Dataset:
     """Return `Inspection.sweeps`; `found` is the result of `zero_load`."""
     angle, unloaded = record["drive_angle"].values, found["unloaded"].values
-    first = np.array([rows[0] for rows in sweeps])
+    first, last = np.array([rows[[0, -1]] for rows in sweeps]).T
     travels = travels_of(record)
     positions = [positions_of(travels[rows]) for rows in sweeps]
     steps = [_usual_step(angle[rows], stops) for rows, stops in zip(sweeps, positions, strict=True)]
-    length = {"units": record["base_x"].attrs["units"]}
-    of_angle = {"units": "rad"}
+    length, of_angle = {"units": record["base_x"].attrs["units"]}, {"units": "rad"}
     table = xr.Dataset(
         {
             "direction": ("sweep", record["direction"].values[first]),
@@ -128,7 +124,7 @@ def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> x
             "base_x": ("sweep", record["base_x"].values[first], length),
             "base_y": ("sweep", record["base_y"].values[first], length),
             "drive_angle_from": ("sweep", angle[first], of_angle),
-            "drive_angle_to": ("sweep", angle[[rows[-1] for rows in sweeps]], of_angle),
+            "drive_angle_to": ("sweep", angle[last], of_angle),
             "drive_step": ("sweep", steps, of_angle),
             "unloaded": ("sweep", [int(np.count_nonzero(unloaded[rows])) for rows in sweeps]),
         },
@@ -137,10 +133,9 @@ def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> x
     names = ["contact", "p_value", "onset_drive_angle", "snap_off_drive_angle"]
     carried = np.isin(table["sweep"].values, carried_sweeps(record))
     if carried.any():
-        whole = [travels[rows[-1]] for rows in sweeps]
         steps = [_usual_step(travels[rows], stops) for rows, stops in zip(sweeps, positions, strict=True)]
         table["carried"] = ("sweep", carried)
-        table["travel"] = ("sweep", np.where(carried, whole, np.nan), length)
+        table["travel"] = ("sweep", np.where(carried, travels[last], np.nan), length)
         table["travel_step"] = ("sweep", np.where(carried, steps, np.nan), length)
         names += ["onset_travel", "snap_off_travel"]
     return table.assign({name: found[name].variable for name in names})
