@@ -1,10 +1,8 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy import stats
 
-from helpers.contour_posteriors import posterior, swept
+from helpers.contour_posteriors import only, posterior, swept
 from tactile_bayes.assessment import assumptions as module
 from tactile_bayes.assessment.assumptions import alternatives_of, band_by_assumption
 from tactile_bayes.contours import Parabola
@@ -18,13 +16,10 @@ from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import expanded
 
 
-def only(*names):
-    """The rig of which these parameters are unknown."""
-    return Rig(unknown={**NOTHING, **dict.fromkeys(names, "default")})
-
-
-def names_of(rig, bases=((0.0, 0.0),), **options):
+def names_of(*unknown, bases=((0.0, 0.0),), rig=None, **options):
+    """Alternatives by name, of a rig of which these parameters are unknown, or of another one."""
     record = swept(Parabola(0.5, 0.5), step=0.1, bases=bases)
+    rig = rig or Rig(unknown=only(*unknown))
     return {each.name: each for each in alternatives_of(Experiment(record, rig, **options))}
 
 
@@ -36,24 +31,24 @@ TWO_PIVOTS = ((0.0, 0.0), (0.2, 0.0))
 
 
 def test_each_unknown_is_added_or_fixed_and_each_other_family_tried():
-    found = names_of(only("bias", "friction"))
+    found = names_of("bias", "friction")
     assert unknown_of(found["bias as stated"]) == ("friction",)
     assert found["friction as stated"].experiment.unknowns.friction == 0.0
     assert found["lever inferred"].kind == "added"
     assert found["family circle"].experiment.own_family == Family("circle")
     assert "family parabola" not in found
     assert "base inferred" not in found  # there is one pivot
-    assert "base inferred" in names_of(only(), bases=TWO_PIVOTS)
-    assert "friction inferred" in names_of(only())
-    assert "friction inferred" not in names_of(only().with_unknown(friction=0.2))
+    assert "base inferred" in names_of(bases=TWO_PIVOTS)
+    assert "friction inferred" in names_of()
+    assert "friction inferred" not in names_of(rig=Rig(unknown=only(friction=0.2)))
     # Gains take the place of the rigidity, which has the same effect.
-    gains = names_of(only("rigidity_scale"))["gain inferred for rigidity_scale"]
+    gains = names_of("rigidity_scale")["gain inferred for rigidity_scale"]
     assert unknown_of(gains) == ("moment_gain", "force_x_gain", "force_y_gain")
 
 
 def test_what_is_fixed_has_the_value_that_rod_and_load_cell_state():
-    rig = replace(only("rest_curvature", "stem", "moment_curve", "base"), rod=Rod(rest_curvature=0.1, stem=0.02))
-    found = names_of(rig, bases=TWO_PIVOTS)
+    unknown = only("rest_curvature", "stem", "moment_curve", "base")
+    found = names_of(rig=Rig(Rod(rest_curvature=0.1, stem=0.02), unknown=unknown), bases=TWO_PIVOTS)
     every = set(unknown_of(found["family circle"]))
     parameters = {"rest_curvature": {"rest_curvature"}, "stem": {"stem"}, "base": {"base_2_x", "base_2_y"}}
     for group, names in parameters.items():
@@ -63,7 +58,7 @@ def test_what_is_fixed_has_the_value_that_rod_and_load_cell_state():
 
 
 def test_a_discrepancy_stays_in_every_alternative():
-    found = names_of(only("bias", "discrepancy"))
+    found = names_of("bias", "discrepancy")
     for name in ("bias as stated", "lever inferred", "family circle"):
         assert found[name].experiment.noise.of_discrepancy == ("discrepancy_scale", "discrepancy_length"), name
 
@@ -72,7 +67,7 @@ def test_a_calibrated_rig_does_not_add_what_is_fixed():
     priors = {"rigidity_scale": stats.lognorm(s=0.01), "lever_x": stats.norm(0.0, 0.01)}
     joint = RigPrior(priors, np.array([[1.0, 0.8], [0.8, 1.0]]), 0.1, "0")
     known = {name: value for name, value in expanded(NOTHING).items() if name not in priors}
-    found = names_of(Rig(unknown=known, calibration=joint))
+    found = names_of(rig=Rig(unknown=known, calibration=joint))
     assert unknown_of(found["rigidity_scale as stated"]) == ("lever_x",)
     assert unknown_of(found["lever as stated"]) == ("rigidity_scale",)
     added = found["backlash inferred"].experiment.unknowns
@@ -85,7 +80,7 @@ def test_a_calibrated_rig_does_not_add_what_is_fixed():
 
 def test_priors_of_what_remains_are_kept():
     of_q, of_friction = stats.uniform(0.4, 0.2), stats.halfnorm(scale=0.1)
-    found = names_of(only().with_unknown(friction=of_friction), family=Family("parabola", q=of_q))
+    found = names_of(rig=Rig(unknown=only(friction=of_friction)), family=Family("parabola", q=of_q))
     fixed, circle = (found[name].experiment.priors for name in ("friction as stated", "family circle"))
     assert fixed["q"] is of_q
     assert "friction" not in fixed

@@ -75,35 +75,23 @@ def test_readings_that_stand_out_are_named_where_the_model_describes_all_others(
 
 
 def group(*rows):
-    names, gains, describes = zip(*rows, strict=True)
-    return xr.Dataset(
-        {
-            "log_evidence": ("cause", list(gains)),
-            "describes": ("cause", list(describes)),
-            "remedy": ("cause", [f"cure of {name}" for name in names]),
-        },
-        coords={"cause": list(names)},
-    )
+    names, gains, describes = map(list, zip(*rows, strict=True))
+    columns = {"log_evidence": gains, "describes": describes, "remedy": [f"cure of {name}" for name in names]}
+    return xr.Dataset({name: ("cause", column) for name, column in columns.items()}, coords={"cause": names})
 
 
-@pytest.mark.parametrize(
-    ("rows", "named", "unnamed"),
-    [
-        (
-            [("a", 900.0, 1), ("c", 20.0, 1), ("b", 400.0, 0)],
-            ["cure of a", "Less likely", " c"],
-            ["cure of b", "cure of c"],
-        ),
-        ([("a", 900.0, 1), ("b", 897.0, 1)], ["cure of a", "cure of b", "gauge"], []),
-        ([("a", 400.0, 1), ("b", 900.0, 0)], ["cure of a"], ["cure of b"]),
-        ([("b", 900.0, 0), ("a", 400.0, 0)], ["Nothing", "cure of b"], ["cure of a"]),
-        ([("b", 1.0, 1)], [], ["cure of b"]),
-    ],
-    ids=["one", "two alike", "what describes", "none describes", "none is better"],
-)
+SAID = {
+    "one": ([("a", 900, 1), ("c", 20, 1), ("b", 400, 0)], ["cure of a", "Less likely", " c"], ["of b", "of c"]),
+    "two alike": ([("a", 900, 1), ("b", 897, 1)], ["cure of a", "cure of b", "gauge"], []),
+    "what describes": ([("a", 400, 1), ("b", 900, 0)], ["cure of a"], ["of b"]),
+    "none describes": ([("b", 900, 0), ("a", 400, 0)], ["Nothing", "cure of b"], ["of a"]),
+    "none is better": ([("b", 1, 1)], [], ["of b"]),
+}
+
+
+@pytest.mark.parametrize(("rows", "named", "unnamed"), SAID.values(), ids=SAID)
 def test_what_is_said_of_causes(rows, named, unnamed):
-    tree = xr.DataTree.from_dict({"causes": group(*rows)})
-    said = likely_causes(tree)
+    said = likely_causes(xr.DataTree.from_dict({"causes": group(*rows)}))
     assert all(word in said for word in named)
     assert not any(word in said for word in unnamed)
     assert likely_causes(xr.DataTree()) == ""

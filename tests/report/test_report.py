@@ -122,14 +122,8 @@ def test_every_reference_within_the_page_has_its_target(page):
 
 def test_every_drawing_has_words_and_every_control_a_label(page):
     drawings = page.all("svg")
-    assert [attrs["id"] for attrs in drawings] == [
-        "contour-map",
-        "band-detail",
-        "rod-map",
-        "readings-holding-moment",
-        "readings-force-x",
-        "readings-force-y",
-    ]
+    readings = [f"readings-{name}" for name in ("holding-moment", "force-x", "force-y")]
+    assert [attrs["id"] for attrs in drawings] == ["contour-map", "band-detail", "rod-map", *readings]
     assert all(attrs["role"] == "img" for attrs in drawings)
     assert all(words.strip() for words in page.texts["title"] + page.texts["desc"])
     assert len(page.texts["desc"]) == len(drawings)
@@ -259,15 +253,6 @@ def test_a_contour_is_known_to_within_its_band_only_where_all_is_well(findings):
     assert rejected["contacts"][1].endswith("no evidence.")
 
 
-def test_the_place_along_x_looks_like_no_pivot(page):
-    marks = {attrs["id"]: tag for tag, attrs in page.elements if attrs.get("id") in ("band-mark", "contact")}
-    assert marks == {"band-mark": "g", "contact": "circle"}
-    pivots = [tag for tag, attrs in page.elements if attrs.get("class") == "pivot"]
-    assert set(pivots) == {"circle"}
-    assert any("place along x" in words for words in page.texts["li"])
-    assert {"class": "js-only"} in page.all("li")  # as the mark is
-
-
 def test_where_it_came_from_is_said(page, folder, posterior):
     digests = dict(page.table("SHA-256")[1:])
     assert digests == {
@@ -294,12 +279,9 @@ def test_the_lines_that_it_gives_make_the_same_draws(page, folder, monkeypatch):
 
 
 def test_what_hinders_that_is_said(posterior):
-    record = record_of(posterior)
-    assert hindrances(posterior, record) == []
-    other = posterior.copy()
-    other.attrs["rig"] = "not written"
-    other.attrs["settings"] = json.dumps({"max_seconds": 5.0})
-    clock, priors = hindrances(other, record)
+    assert hindrances(posterior.attrs) == []
+    settings = json.dumps({"max_seconds": 5.0})
+    clock, priors = hindrances(posterior.attrs | {"rig": "not written", "settings": settings})
     assert "by the clock" in clock
     assert "give rig=" in priors
 

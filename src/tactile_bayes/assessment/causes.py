@@ -30,8 +30,7 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     """Try what may be wrong with the rig or the family of a posterior that does not describe its record.
 
     Each unknown of the rig that is not inferred is added, and each other family taken, and the most probable parameters
-    are sought again, from Step 2's contact points and from those of the posterior. Nothing is sampled. It takes one or
-    two seconds for each, and two minutes at most: then searches end with what they have.
+    are sought again, without sampling. It takes one or two seconds for each, and two minutes at most.
 
     Parameters
     ----------
@@ -43,12 +42,11 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     Returns
     -------
     xr.Dataset
-        Over "cause", those that describe the record first, and the likeliest of them: log_evidence above that of the
-        model as it is, by Laplace's approximation for the noise as it is estimated from the record; describes, 1 if the
-        rest is no more than that noise; and remedy, the entries of rig.toml, or the family. A cause that could not be
-        tried is left out. If single samples fit no contact until a column is read otherwise (another sign, say), or
-        the model describes all but some readings that stand out, nothing is tried, and the attribute misread is what
-        `inspect_record` says of it.
+        Over "cause", those that describe the record first, then by log_evidence, above that of the model as it is, by
+        Laplace's approximation for the noise as it is estimated from the record; describes, 1 if the rest is no more
+        than that noise; and remedy, the entries of rig.toml, or the family. If single samples fit no contact until a
+        column is read otherwise (another sign, say), or the model describes all but some readings that stand out,
+        nothing is tried, and the attribute misread is what `inspect_record` says of it.
 
     Raises
     ------

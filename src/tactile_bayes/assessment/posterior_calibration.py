@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.assessment.split_prediction import predicted_readings
 from tactile_bayes.calibration.coverage import coverage_p_value
 from tactile_bayes.calibration.replicate import (
     REPLICATES,
@@ -139,18 +140,14 @@ def _task(
     """Return the truths and their records, from the predictions of the posterior."""
     names = experiment.model.names
     points = points_of(posterior, names).reshape(-1, len(names))
-    predicted = posterior["posterior_predictive"].to_dataset().transpose("chain", "draw", "sample")
-    available = predicted.sizes["chain"] * predicted.sizes["draw"]
+    readings = predicted_readings(posterior)
+    available = len(readings)
     if available < replicates:
         raise InferenceError(f"the posterior holds {available} predictions of the record, {replicates} are needed")
     chosen = np.random.default_rng([*words(seed), 1]).permutation(available)[:replicates]
-    readings = np.full((replicates, predicted.sizes["sample"], len(CHANNELS)), np.nan)
-    for i, name in enumerate(CHANNELS):
-        if name in predicted:
-            readings[..., i] = predicted[name].values.reshape(available, -1)[chosen]
     truths, starts = predicted_points(posterior, names)[chosen], points[evenly_spread(len(points), _STARTS)]
     settings = replace(_SETTINGS, walkers=walkers_of(len(names)))
-    return PosteriorExperiment(experiment, truths, readings, starts, probability, seed, settings)
+    return PosteriorExperiment(experiment, truths, readings[chosen], starts, probability, seed, settings)
 
 
 def _replicate(task: tuple[PosteriorExperiment, int]) -> Outcome:

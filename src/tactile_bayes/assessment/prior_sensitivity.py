@@ -82,4 +82,5 @@ def _weights(log_density: Floats, power: float) -> Floats:
 def _sensitivity(values: Floats, weights: list[Floats]) -> float:
     if np.ptp(values) == 0.0:
         return 0.0
-    return float(array_stats.power_scale_sense(values, *weights, *_POWERS))
+    lower, upper = weights
+    return float(array_stats.power_scale_sense(values, lower, upper, *_POWERS))

@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
-from tactile_bayes.arrays import Flags
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.assessment.linear_fit import LinearFit, Linearisation
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.result import best_draw
 from tactile_bayes.inference.stored_experiment import points_of, predicted_points
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS
@@ -34,24 +35,28 @@ def split_prediction(posterior: xr.DataTree, model: ContourModel) -> xr.Dataset:
     the noise is known, since noise that is inferred explains any misfit.
     """
     points = points_of(posterior, model.names)
-    predicted = posterior["posterior_predictive"].to_dataset().transpose("chain", "draw", "sample")
-    chosen = evenly_spread(predicted.sizes["chain"] * predicted.sizes["draw"], _RECORDS)
+    predicted = predicted_readings(posterior)
+    chosen = evenly_spread(len(predicted), _RECORDS)
     if chosen.size < _FEWEST_RECORDS:
         raise InferenceError(f"the posterior holds {chosen.size} predictions of the record, too few: sample longer")
     parts, linear = parts_of(model), Linearisation(model, points.std(axis=(0, 1)))
-    every = posterior["sample_stats"].to_dataset()["lp"].transpose("chain", "draw").values
-    best = points[np.unravel_index(int(np.argmax(every)), every.shape)].copy()
+    drawn = best_draw(posterior)
+    best = np.array([float(drawn[name]) for name in model.names])
     best[len(model.forward_parameters) :] = np.median(points, axis=(0, 1))[len(model.forward_parameters) :]
     starts = predicted_points(posterior, model.names)[chosen]
-    records = np.full((1 + chosen.size, *model.likelihood.measured.shape), np.nan)
-    records[0] = model.likelihood.measured
-    for i, (name, unit) in enumerate(zip(CHANNELS, model.likelihood.rod.load_units, strict=True)):
-        if name in predicted:
-            records[1:, :, i] = predicted[name].values.reshape(-1, records.shape[1])[chosen] / unit
+    records = np.stack([model.likelihood.measured, *(predicted[chosen] / model.likelihood.rod.load_units)])
     first, *others = linear.fits(records, np.vstack([best[None], starts]))
     if first is None:
         raise InferenceError("the most probable contour of the posterior is out of reach: infer it again")
     return _compared([first, *(fit for fit in others if fit is not None)], parts, model.forward_parameters)
+
+
+def predicted_readings(posterior: xr.DataTree) -> Floats:
+    """Return the records that a posterior predicts, shape (records, samples, 3); NaN where a channel is missing."""
+    predicted = posterior["posterior_predictive"].to_dataset().transpose("chain", "draw", "sample")
+    missing = np.full([predicted.sizes[name] for name in ("chain", "draw", "sample")], np.nan)
+    channels = [predicted[name].values if name in predicted else missing for name in CHANNELS]
+    return np.stack(channels, axis=-1).reshape(-1, missing.shape[-1], len(CHANNELS))
 
 
 def parts_of(model: ContourModel) -> dict[str, Flags]:

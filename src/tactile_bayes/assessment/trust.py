@@ -21,6 +21,7 @@ from tactile_bayes.checks import check_path, check_probability, check_switch, ch
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.diagnostics.result_check import probability_of
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import contour_draws, read_result
 from tactile_bayes.inference.stored_experiment import experiment_of
@@ -52,24 +53,23 @@ def trust(
     """Judge whether the band of a posterior holds for this record, and what it rests on.
 
     Five questions are answered. *Do parts of the record agree?* Each sweep, each pivot, and the earlier and later half
-    of the contacts alone predict the rest (`parts`): this sees what the model lacks, such as friction, a zero that
-    moves, a slipped pivot, a wrong family. *Does the computation hold here?* Truths are drawn from this posterior,
-    records predicted from them, and both inferred again (posterior simulation-based calibration): this sees a wrong
-    sampler, and says how often the intervals hold for objects and rigs like this one. *What does the prior do?* Prior
-    and likelihood are raised to a power near one. *Which assumption matters?* The band is computed again with each
-    unknown of the rig added or fixed, and with each other family. *How exact is the sampling?* The Monte-Carlo error of
-    the band. Of a posterior that has not converged there are neither replicates nor other assumptions: they would say
-    nothing of the record.
+    of the contacts alone predict the rest: this sees what the model lacks, such as friction, a zero that moves, a
+    slipped pivot, a wrong family. *Does the computation hold here?* Truths are drawn from this posterior, records
+    predicted from them, and both inferred again (posterior simulation-based calibration): this sees a wrong sampler,
+    and says how often the intervals hold for objects and rigs like this one. *What does the prior do?* Prior and
+    likelihood are raised to a power near one. *Which assumption matters?* The band is computed again with each unknown
+    of the rig added or fixed, and with each other family. *How exact is the sampling?* The Monte-Carlo error of the
+    band. The second and the fourth are asked of converged posteriors alone.
 
     Parameters
     ----------
     run_or_posterior : path-like or xr.DataTree
         Folder that `tactile-bayes infer` has written, its posterior.nc, or a result of `infer_contour`.
     replicates : int
-        Number of truths that are drawn and inferred again, 0 for none; each takes one or two seconds on one core, and
-        some tens with a shape-free family.
+        Number of truths that are drawn and inferred again, 0 for none; each takes one or two seconds on one core, some
+        tens with a shape-free family.
     assumptions : bool
-        Whether the band is computed again under other assumptions, which takes some ten seconds each.
+        Whether the band is computed again under other assumptions, in some ten seconds each.
     probability : float, optional
         Probability of the band, in (0, 1); by default that of the run, or 0.95.
     family, rig : Family and Rig, optional
@@ -84,33 +84,31 @@ def trust(
     Returns
     -------
     xr.Dataset
-        Over "x": lower, median, upper, the band [length], and lower_error, median_error, upper_error, share, see
-        `sampling_error`; draws, effective_draws, draws_needed. Where the calibration shows that the band is too narrow,
-        corrected_lower and corrected_upper, its ends farther from the median by the factor of each region.
+        The band over "x" [length]: lower, median, upper, and their lower_error, median_error and upper_error (share, of
+        the width; draws, effective_draws, and draws_needed for a tenth of it); where the calibration shows that it is
+        too narrow, corrected_lower and corrected_upper, its ends farther from the median by the factor of each region.
 
-        Over "part": part_p_value, part_sd; moves (part, parameter); split_p_value: see `split_prediction`.
+        Over "part": part_p_value, part_sd, moves (part, parameter); split_p_value of all; check_p_value of `check`.
 
-        Over "quantity": sensitivity (quantity, component), set_by: see `prior_sensitivity`.
+        Over "quantity": sensitivity (quantity, component), set_by.
 
-        Over "ranked" and "claim", if there are replicates: rank_p_value (ranked), coverage, coverage_error,
-        coverage_replicates, noticed_below (claim), factor and corrected (region): see `posterior_calibration`.
+        If there are replicates: rank_p_value (ranked), coverage, coverage_error, coverage_replicates and noticed_below
+        (claim), factor and corrected (region).
 
         Over "assumption", if asked for: kind, fits, converged, message; moved_in_gap and moved_beside, the largest
         distance of the medians over the width of the band there; over "grid" too: other_lower, other_median,
-        other_upper, moved, see `band_by_assumption`.
+        other_upper, moved.
 
-        check_p_value of `check`. Attributes: conclusion, "holds", "holds, but the prior sets the gap" or "do not
-        rely on it"; summary, a sentence with the reasons; words, all sentences, one in a line; probability;
-        draws_sha256 of the posterior.
+        Attributes: conclusion, "holds", "holds, but the prior sets the gap" or "do not rely on it"; summary, a sentence
+        with the reasons; words, all sentences, one in a line; probability; draws_sha256 of the posterior.
 
     Raises
     ------
     ParameterError
         If an argument is impossible.
     InferenceError
-        If there is no posterior of a contour with its predictions, too few samples are loaded, or it is one without
-        unloaded samples (``SamplerSettings(events=False)``), or with more than 2000 samples that share a drift process
-        or a bias that is integrated out.
+        If there is no posterior of a contour with its predictions and unloaded samples, too few samples are loaded, or
+        more than 2000 share a drift process or a bias that is integrated out.
     CalibrationError
         If `out` holds replicates of another posterior, or another run uses it.
     TaskError
@@ -150,17 +148,9 @@ def trust(
     if not is_converged:
         replicates, assumptions = 0, False
     x = reach(posterior)
+    regions = _regions(posterior, x, chance)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        band = contour_band(posterior, x, chance)
-        found = sampling_error(posterior, x, chance).assign({name: band[name] for name in ("lower", "median", "upper")})
-        check = predictive_check(posterior)
-        if check.attrs["not_checked"]:
-            raise InferenceError(f"there is nothing to judge this posterior by: {check.attrs['not_checked']}")
-        found["check_p_value"] = check.overall_p_value
-        parts = split_prediction(posterior, experiment.model)
-        found = found.merge(parts.rename(p_value="part_p_value", sd="part_sd", overall_p_value="split_p_value"))
-        regions = _regions(posterior, x, chance)
-        found = found.merge(prior_sensitivity(posterior, experiment.model, regions))
+        found, check, parts = _of_draws(posterior, experiment.model, x, chance, regions)
     others = alternatives_of(experiment) if assumptions else []
     calibrated: xr.Dataset | None = None
 
@@ -198,6 +188,20 @@ def trust(
     return found
 
 
+def _of_draws(
+    posterior: xr.DataTree, model: ContourModel, x: Floats, probability: float, regions: Mapping[str, Floats]
+) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
+    """Return what follows without further inference, the check of the record, and its parts."""
+    check = predictive_check(posterior)
+    if check.attrs["not_checked"]:
+        raise InferenceError(f"there is nothing to judge this posterior by: {check.attrs['not_checked']}")
+    parts = split_prediction(posterior, model)
+    found = sampling_error(posterior, x, probability).assign(check_p_value=check.overall_p_value)
+    found = found.merge(contour_band(posterior, x, probability)[["lower", "median", "upper"]])
+    found = found.merge(parts.rename(p_value="part_p_value", sd="part_sd", overall_p_value="split_p_value"))
+    return found.merge(prior_sensitivity(posterior, model, regions)), check, parts
+
+
 def draws_digest(posterior: xr.DataTree) -> str:
     """Return the SHA-256 of the draws of a posterior."""
     digest = hashlib.sha256()
@@ -230,7 +234,7 @@ def _is_in_gap(x: xr.DataArray, regions: Mapping[str, Floats]) -> xr.DataArray:
 
 def _moved(other: xr.Dataset, regions: Mapping[str, Floats]) -> dict[str, xr.DataArray]:
     """Return the largest distance of the medians in each region, over the width of the band."""
-    sizes = np.abs(other["moved"].drop_attrs())
+    sizes = abs(other["moved"].drop_attrs())
     sizes, in_gap = sizes.where(np.isfinite(sizes)), _is_in_gap(other["grid_x"], regions)
     return {
         f"moved_{name}": sizes.where(there).max("grid") for name, there in (("in_gap", in_gap), ("beside", ~in_gap))

@@ -16,6 +16,7 @@ UNCONVERGED = (
 )
 
 _LARGEST = 2.0  # change of a parameter, in standard deviations, from which it is named
+_WHERE = {"in_gap": "in the gap", "beside": "beside the gap"}
 _SETS = {
     "record": "is set by the record",
     "both": "depends on the record, and on the prior as well",
@@ -70,13 +71,11 @@ def sentences(
     if calibrated is not None:
         verdict = str(calibrated.attrs["verdict"])
         said.append(f"For objects and rigs like this one: {verdict[:1].lower()}{verdict[1:]}")
-        for region, name in (("in_gap", "in the gap"), ("beside", "beside the gap")):
-            of_region = calibrated.sel(region=region)
-            if int(of_region["corrected"]):
-                said.append(
-                    f"Corrected: the band {name} is too narrow here, and its half widths are multiplied by "
-                    f"{float(of_region['factor']):.2f}."
-                )
+        for region, where in _WHERE.items():
+            if int(calibrated["corrected"].sel(region=region)):
+                factor = f"{float(calibrated['factor'].sel(region=region)):.2f}"
+                wider = f"its half widths are multiplied by {factor}"
+                said.append(f"Corrected: the band {where} is too narrow here, and {wider}.")
     largest = float(np.nanmax(found["share"].values))
     enough = f"{int(found['draws'])} draws, {float(found['effective_draws']):.0f} effective ones at its ends"
     if largest > WANTED_SHARE:
@@ -85,9 +84,8 @@ def sentences(
 
 
 def _of_parts(parts: xr.Dataset) -> str:
-    named = ", ".join(
-        f"{name} {sd:.1f}" for name, sd in zip(parts["part"].values, parts["sd"].values, strict=True) if name != "noise"
-    )
+    deviations = zip(parts["part"].values, parts["sd"].values, strict=True)
+    named = ", ".join(f"{name} {sd:.1f}" for name, sd in deviations if name != "noise")
     agree = "agree" if parts.attrs["passed"] else "disagree"
     return (
         f"The parts of the record {agree} (p = {_p(parts['overall_p_value'])}, of {parts.attrs['records']} "
@@ -97,19 +95,16 @@ def _of_parts(parts: xr.Dataset) -> str:
 
 def _of_prior(found: xr.Dataset, mute: Collection[str]) -> list[str]:
     said = []
-    for quantity, name in (("band in_gap", "in the gap"), ("band beside", "beside the gap")):
-        if quantity in found.quantity:
-            row = found.sel(quantity=quantity)
-            which = ""
-            if str(row["set_by"].values) != "record":
+    for region, where in _WHERE.items():
+        if f"band {region}" in found.quantity:
+            row, which = found.sel(quantity=f"band {region}"), ""
+            set_by = str(row["set_by"].values)
+            if set_by != "record":
                 of_contour, of_rig = (float(row["sensitivity"].sel(component=c)) for c in ("contour", "rig"))
                 which = f", that of the {'contour' if of_contour >= of_rig else 'rig'}"
-            said.append(f"The band {name} {_SETS[str(row['set_by'].values)]}{which}.")
-    by_prior = [
-        str(name)
-        for name, by in zip(found["quantity"].values, found["set_by"].values, strict=True)
-        if by == "prior" and not str(name).startswith("band ") and name not in mute
-    ]
+            said.append(f"The band {where} {_SETS[set_by]}{which}.")
+    names = found["quantity"].values[found["set_by"].values == "prior"].tolist()
+    by_prior = [name for name in names if not name.startswith("band ") and name not in mute]
     if by_prior:
         said.append(f"Set by the prior: {', '.join(by_prior)}.")
     return said
@@ -124,11 +119,10 @@ def _of_assumptions(found: xr.Dataset) -> list[str]:
         return [f"The record rejects all of the {count} other assumptions that were tried."]
     said = [f"Of {count} other assumptions, the record does not reject {left.sizes['assumption']}."]
     for region, where in (("in_gap", "in the gap"), ("beside", "beside it")):
-        moved = left[f"moved_{region}"].values
-        if np.isfinite(moved).any():
-            k = int(np.nanargmax(moved))
-            name = str(left["assumption"].values[k])
-            said.append(f"Most of all, “{name}” moves the median of the band {where}: by {moved[k]:.2f} of its width.")
+        moved = left[f"moved_{region}"].dropna("assumption")
+        if moved.size:
+            most, name = float(moved.max()), moved.idxmax().item()
+            said.append(f"Most of all, “{name}” moves the median of the band {where}: by {most:.2f} of its width.")
     return said
 
 

@@ -74,27 +74,16 @@ class Check:
         True if nothing is wrong, and the record was compared with what the posterior predicts.
     predictive : xr.Dataset or None
         That comparison, over "discrepancy" and "channel" (those that were measured); None if the tree holds fewer than
-        100 predictions.
+        100 predictions. p_value: share of records, predictions and the real one, that are at least as discrepant as the
+        real one; NaN where there are too few samples. score: discrepancy above its median over predictions, over the
+        same of their 95 % quantile; 1 is unusual, some tens are a visible misfit. overall_p_value: share of records of
+        which the largest score is at least that of the real one; NaN if the check was not made.
 
-        p_value
-            Share of records, predictions and the real one, that are at least as discrepant as the real one; NaN where
-            there are too few samples.
-        score
-            Discrepancy above its median over predictions, over the same of their 95 % quantile: 1 is unusual, some
-            tens are a visible misfit.
-        worst_sweep, worst_from, worst_to (channel)
-            Sweep and drive angles [rad] of the stretch whose mean residual is largest, in standard errors. If the drive
-            carries the base in some sweep, also worst_from_travel and worst_to_travel, as in the group `events`.
-        worst_residual (channel)
-            That mean, in the record's units.
-        neighbour_noise (channel)
-            Standard deviation of white noise, estimated from second differences of neighbouring residuals, in the
-            record's units: the noise if everything smooth is misfit.
-        smooth (channel)
-            Loaded residuals over that noise, if the check fails because they are smooth and larger, and no discrepancy
-            is inferred; else NaN.
-        overall_p_value
-            Share of records of which the largest score is at least that of the real one; NaN if the check was not made.
+        Over "channel": worst_sweep, worst_from and worst_to [rad], the stretch whose mean residual is largest, in
+        standard errors (if the drive carries the base in some sweep, also worst_from_travel and worst_to_travel);
+        worst_residual, that mean in the record's units; neighbour_noise, the standard deviation of white noise by
+        second differences of neighbouring residuals, in the record's units; smooth, loaded residuals over that noise,
+        if the check fails because they are smooth and larger, and no discrepancy is inferred, else NaN.
 
         Attributes: `passed` (0 or 1; 0 also if the check was not made), `not_checked`, why it was not made (there are
         too few loaded samples), else empty, `false_alarm` (the probability in effect), `predictions` (their number).
@@ -143,9 +132,8 @@ def check(
 ) -> Check:
     """Check a posterior of a contour or a rig: what is wrong with it, or with its record.
 
-    The noise that is inferred beside the contour absorbs misfit from any cause, such as a contour outside the family, a
-    wrong rod or a forgotten tare, so that the size of the residuals is uninformative. Their pattern is not: misfit is
-    smooth in the drive angle and absent from unloaded samples; noise is neither.
+    The noise that is inferred beside the contour absorbs misfit from any cause, so that the size of the residuals is
+    uninformative. Their pattern is not: misfit is smooth in the drive angle and absent from unloaded samples.
 
     Parameters
     ----------
@@ -162,13 +150,12 @@ def check(
     Returns
     -------
     Check
-        Its messages report: loads that such a rod cannot have; a zero that is off, or that moved; a record unlike the
-        predictions of the posterior; reasons not to rely on the band (`trust`); ensembles that have not converged;
+        Its messages report, in this order: loads that such a rod cannot have; a zero that is off, or that moved; a
+        record unlike the predictions; reasons not to rely on the band (`trust`); ensembles that have not converged;
         noise twice as large as stated, or half; loads of a sample that contradict one another; unknowns of the rig that
-        are nearly impossible under their prior; smooth residuals, which a discrepancy can describe; parameters that are
-        cut off where the model has no path of the rod; a check that was not made, with the reason. The last, which are
-        no faults, say that the prior sets the gap, name parameters of the contour (of a rig: all) that the record
-        hardly determines, and, where all is well, tell what sets the width of the band (`uncertainty_budget`).
+        are nearly impossible under their prior; parameters that are cut off where the model has no path of the rod;
+        smooth residuals; a check that was not made. The last, which are no faults, say that the prior sets the gap,
+        which parameters the record hardly determines, and, where all is well, what sets the width of the band.
 
     Raises
     ------
@@ -181,7 +168,8 @@ def check(
     -----
     Residuals are readings less the median of the predicted ones, over half the width of their central 95 % interval
     (over 1.96), for the real record and for all predicted ones alike; so drift, correlated noise, outliers and
-    resolution need no treatment of their own. Draws of lost walkers are left out. In each channel:
+    resolution need no treatment of their own. Draws of lost walkers are left out. In each channel, with residuals
+    clipped at 4 except for `largest`:
 
     - runs: mean square of the running mean over an eighth of the loaded part of a sweep, over that of the differences
       of neighbours;
@@ -190,11 +178,9 @@ def check(
     - loaded: mean square of loaded samples over that of unloaded ones;
     - zero: mean of the unloaded samples over their root mean square.
 
-    All except `largest` clip residuals at 4. None depends on the size of the noise. The p-values are those of Gelman,
-    Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre. The posterior is inferred from the
-    same record, so they are conservative: under a true model they are rarely small, and the more rarely the more
-    parameters there are per sample. A record that passes is not proven right: misfit below the noise over √(samples in
-    a stretch) remains undetected.
+    The p-values are those of Gelman, Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre.
+    The posterior is inferred from the same record, so they are conservative: under a true model they are rarely small.
+    A record that passes is not proven right: misfit below the noise over √(samples in a stretch) remains undetected.
 
     Examples
     --------

@@ -37,9 +37,10 @@ def unit_and_sign_findings(measured: xr.Dataset, load_cell: LoadCell | None = No
         firm = force > 0.1 * _largest(force)
         found += _of_size(record, measured, force, firm, has_all=len(forces) == 2)
         if len(forces) == 2:
-            is_turning = frame_of(record) == "turning"
-            force_y = (turned(*forces, -record.drive_angle.values) if is_turning else forces)[1][firm]
-            if force_y.sum() < -0.5 * np.abs(force_y).sum():
+            force_x, force_y = forces
+            if frame_of(record) == "turning":
+                force_y = turned(force_x, force_y, -record.drive_angle.values)[1]
+            if force_y[firm].sum() < -0.5 * np.abs(force_y[firm]).sum():
                 found.append(Finding("force sign"))
     if "holding_moment" in present:
         drive = np.where(record.direction.values == "backward", -1.0, 1.0)

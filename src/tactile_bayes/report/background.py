@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -10,7 +12,7 @@ import numpy as np
 from tactile_bayes.record import MEASURED, carried_sweeps, travels_of
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.meanings import is_direction, meaning_of
-from tactile_bayes.report.wording import PageTable, Shown, fixed, percent, shown_as
+from tactile_bayes.report.wording import PageTable, fixed, percent, shown_as
 from tactile_bayes.tasks.documents import read_json
 
 
@@ -38,14 +40,15 @@ def _sweeps(findings: Findings) -> PageTable:
         rows_of = np.flatnonzero(record.sweep.values == number)
         angle = np.degrees(record.drive_angle.values[rows_of])
         of_sweep = zero.sel(sweep=number)
-        drive = [fixed(angle[0], ".1f"), fixed(angle[-1], ".1f")]
-        spans = [_between(of_sweep[f"{event}_drive_angle"].values) for event in ("onset", "snap_off")]
+        drive, place = [fixed(angle[0], ".1f"), fixed(angle[-1], ".1f")], "drive_angle"
+        text: Callable[[float], str] = _degrees
         if number in carried:
             unit = shown_as("contact_x", record["base_x"].attrs, travels[rows_of])
             drive.append(f"carried {unit.full(float(travels[rows_of[-1]]))}")
-            spans = [_along(of_sweep[f"{event}_travel"].values, unit) for event in ("onset", "snap_off")]
+            place, text = "travel", unit.full
         elif carried:
             drive.append("–")
+        spans = [_between(of_sweep[f"{event}_{place}"].values, text) for event in ("onset", "snap_off")]
         unloaded = int(np.count_nonzero(zero["unloaded"].values[rows_of]))
         base = f"({length.text(float(record.base_x[rows_of[0]]))}, {length.text(float(record.base_y[rows_of[0]]))})"
         row = [str(int(number)), str(record.direction.values[rows_of[0]]), f"{base} {length.name}".rstrip()]
@@ -57,20 +60,17 @@ def _sweeps(findings: Findings) -> PageTable:
     return PageTable("Sweeps, with contact as the readings alone bound it", heads, rows, 3)
 
 
-def _along(travels: Any, unit: Shown) -> str:
-    if not np.isfinite(travels).any():
-        return "not detected"
-    return " and ".join(unit.full(float(travel)) if np.isfinite(travel) else "…" for travel in travels)
+def _degrees(angle: float) -> str:
+    return fixed(math.degrees(angle), ".1f") + "°"
 
 
-def _between(angles: Any) -> str:
-    if not np.isfinite(angles).any():
+def _between(values: Any, text: Callable[[float], str]) -> str:
+    if not np.isfinite(values).any():
         return "not detected"
-    return " and ".join(fixed(float(angle), ".1f") + "°" if np.isfinite(angle) else "…" for angle in np.degrees(angles))
+    return " and ".join(text(float(value)) if np.isfinite(value) else "…" for value in values)
 
 
 def _priors(findings: Findings) -> PageTable:
-    """Return the priors as text."""
     family = str(findings.posterior.attrs["family"])
     stated = read_json(findings.posterior.attrs["priors"], "priors")
     rows = [[name, meaning_of(name, family), words] for name, words in stated.items() if not is_direction(name)]
@@ -80,24 +80,21 @@ def _priors(findings: Findings) -> PageTable:
 
 
 def _settings(findings: Findings) -> PageTable:
-    """Return the settings of the sampler."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].attrs
-    rows = [["seed", str(attrs["seed"])], ["sampler", str(attrs.get("sampler", ""))]]
-    settings = read_json(attrs["settings"], "settings")
-    rows += [[name, "none" if value is None else f"{value}"] for name, value in settings.items()]
-    rows += [[name, str(int(stats[name]))] for name in ("steps_run", "steps_kept", "evaluations", "stuck")]
-    rows.append(["seconds", f"{float(stats['seconds']):.3g}"])
-    return PageTable("Sampler", ["setting", "value"], rows, 2)
+    rows = {"seed": attrs["seed"], "sampler": attrs.get("sampler", "")}
+    rows |= {name: "none" if v is None else v for name, v in read_json(attrs["settings"], "settings").items()}
+    rows |= {name: int(stats[name]) for name in ("steps_run", "steps_kept", "evaluations", "stuck")}
+    return _pairs("Sampler", {**rows, "seconds": f"{float(stats['seconds']):.3g}"}, "setting")
 
 
 def _rig(findings: Findings) -> PageTable:
     """Return rod, load cell, friction, and the unknowns of the rig."""
     attrs = findings.posterior.attrs
-    names = [name for name in attrs if str(name).startswith(("rod_", "load_cell_"))]
-    rows = [[str(name), _plain(attrs[name])] for name in (*names, "units", "friction")]
-    unknowns = read_json(attrs["nuisances"], "nuisances")
-    rows.append(["inferred beside the contour", ", ".join(unknowns) or "nothing: the rig is taken as stated"])
-    return PageTable("Rig, as assumed; numbers in the units of the record", ["entry", "value"], rows, 2)
+    names = [str(name) for name in attrs if str(name).startswith(("rod_", "load_cell_"))]
+    unknowns = ", ".join(read_json(attrs["nuisances"], "nuisances")) or "nothing: the rig is taken as stated"
+    rows = {name: _plain(attrs[name]) for name in (*names, "units", "friction")}
+    caption = "Rig, as assumed; numbers in the units of the record"
+    return _pairs(caption, {**rows, "inferred beside the contour": unknowns}, "entry")
 
 
 def _columns(findings: Findings) -> PageTable | None:
@@ -113,8 +110,8 @@ def _columns(findings: Findings) -> PageTable | None:
 def _statements(findings: Findings) -> PageTable | None:
     """Return attributes of the record that concern neither rod nor load cell."""
     said = read_json(findings.posterior.attrs.get("record_attributes", "{}"), "record_attributes")
-    rows = [[name, _plain(value)] for name, value in said.items()]
-    return PageTable("Attributes of the record", ["entry", "value"], rows, 2) if rows else None
+    rows = {name: _plain(value) for name, value in said.items()}
+    return _pairs("Attributes of the record", rows, "entry") if rows else None
 
 
 def _plain(value: Any) -> str:
@@ -124,20 +121,22 @@ def _plain(value: Any) -> str:
 def _versions(findings: Findings) -> PageTable:
     """Return the software of the inference and of this report."""
     attrs = findings.posterior.attrs
-    stated = read_json(attrs.get("versions", "{}"), "versions")
-    rows = [[name, of_name] for name, of_name in stated.items()]
-    if not rows:
-        rows = [["tactile-bayes", str(attrs.get("inference_library_version", "not stated"))]]
-    rows.append(["this report: tactile-bayes", version("tactile-bayes")])
-    return PageTable("Software of the inference", ["name", "version"], rows, 2)
+    rows = read_json(attrs.get("versions", "{}"), "versions")
+    rows = rows or {"tactile-bayes": attrs.get("inference_library_version", "not stated")}
+    own = {"this report: tactile-bayes": version("tactile-bayes")}
+    return _pairs("Software of the inference", rows | own, "name", "version")
 
 
 def _hashes(findings: Findings) -> PageTable:
     """Return digests of the files and of the record."""
     attrs = findings.posterior.attrs
-    rows = [["posterior.nc", findings.posterior_sha256], ["record, as stored in it", findings.record_sha256]]
+    rows = {"posterior.nc": findings.posterior_sha256, "record, as stored in it": findings.record_sha256}
     if attrs["data_sha256"] != findings.record_sha256:
-        rows.append(["record, as used in the inference", str(attrs["data_sha256"])])
+        rows["record, as used in the inference"] = attrs["data_sha256"]
     if "record_file_sha256" in attrs:
-        rows.append([f"file {attrs['record_file']}", str(attrs["record_file_sha256"])])
-    return PageTable("SHA-256", ["of", "digest"], rows, 2)
+        rows[f"file {attrs['record_file']}"] = attrs["record_file_sha256"]
+    return _pairs("SHA-256", rows, "of", "digest")
+
+
+def _pairs(caption: str, rows: Mapping[str, Any], first: str, second: str = "value") -> PageTable:
+    return PageTable(caption, [first, second], [[name, str(value)] for name, value in rows.items()], 2)

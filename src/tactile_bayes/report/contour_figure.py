@@ -62,54 +62,15 @@ def gap_ends(findings: ContourFindings) -> tuple[float, float] | None:
 
 def contour_figure(findings: ContourFindings) -> ContourFigure:
     """Draw the inferred contour."""
-    band, attrs = findings.band, findings.band["lower"].attrs
-    x, lower, median, upper = (band[name].values for name in ("x", "lower", "median", "upper"))
+    x, lower, median, upper = (findings.band[name].values for name in ("x", "lower", "median", "upper"))
     bases = np.array(bases_of(found_rig(findings.record, findings.posterior).record))  # as contacts have them
-    unit = shown_as("contact_x", attrs, np.concatenate([x, bases.ravel()]))
+    unit = shown_as("contact_x", findings.band["lower"].attrs, np.concatenate([x, bases.ravel()]))
     ends = gap_ends(findings)
-
-    about = np.concatenate([x, bases[:, 0]]), np.concatenate([median, bases[:, 1]])
-    overview, height = Plot.map_of(*about, unit)
-    entries = [("key-band", f"{percent(findings.probability)} band"), ("key-median", "median")]
-    if ends:
-        overview.stretch(*ends, "gap")
-        entries.append(("key-gap", "gap, touched by neither sweep"))
-    overview.area(x, lower, upper, "band")
-    overview.path(x, median, "median")
-    entries += _put_contacts(overview, findings, x)
-    if findings.overlay is not None:
-        put_overlay(overview, findings.overlay)
-        entries.append(("key-overlay", findings.overlay.name))
-    overview.put_pivots(bases)
-    word = "base, at the beginning" if carried_sweeps(findings.record) else "pivot" if len(bases) == 1 else "pivots"
-    entries.append(("key-pivot", word))
-    diamond = element("path", d="M-7 0L0 -7L7 0L0 7Z")
-    overview.put(element("g", diamond, id="band-mark", class_="place js-only", transform="translate(-20 -20)"))
-    entries.append(("key-place js-only", "place along x, chosen below or beside"))
-
-    off = np.stack([lower - median, upper - median])
-    other = None if findings.overlay is None else findings.overlay.polyline.height(x, median) - median
-    fine = shown_as("contact_x", attrs, off)
-    labels = overview.x_label, f"y − median{fine.bracketed}"
-    shown = off if other is None else np.stack([*off, np.clip(other, *(_MOST_OFF * np.nanmax(np.abs(off)) * _SIGNS))])
-    detail = Plot.around(x, shown, labels, _DETAIL_HEIGHT, (unit.power, fine.power))
-    if ends:
-        detail.stretch(*ends, "gap")
-    detail.area(x, off[0], off[1], "band")
-    if findings.shape is not None:
-        middle = findings.shape["median"].values
-        detail.area(x, findings.shape["lower"].values - middle, findings.shape["upper"].values - middle, "shape")
-        entries.append(("key-shape", "that of the shape alone, up to a shift"))
-    detail.path(x, np.zeros_like(x), "median")
-    if findings.overlay is not None and other is not None:
-        put_overlay_band(detail, findings.overlay, x, median)
-        detail.path(x, other, "overlay")
-    rule = {"y1": detail.y.end, "y2": detail.y.start, "x1": -20, "x2": -20}
-    detail.put(element("line", id="band-rule", class_="rule js-only", **rule))
+    overview, height, entries = _overview(findings, bases, unit, ends)
+    detail, more = _detail(findings, overview.x_label, unit, ends)
 
     rows = _rows(x, lower, median, upper, unit)
     words = _said(rows, percent(findings.probability), unit)
-    width = np.nan_to_num(upper - lower)
     places = {
         "x": [detail.x.at(value) for value in x],
         "mapX": [overview.x.at(value) for value in x],
@@ -118,37 +79,78 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
         "first": int(np.argmin(np.abs(x - (np.mean(ends) if ends else np.mean(x))))),
     }
     between = f"from {unit.text(float(x[0]))} to {unit.full(float(x[-1]))}"
-    title = "Contour, with band, contact points, gap and pivot"
     description = (
-        f"Map of the contour {between}. The band is widest at {words[int(np.argmax(width))]}. "
+        f"Map of the contour {between}. The band is widest at {words[int(np.argmax(np.nan_to_num(upper - lower)))]}. "
         f"{'A gap lies between ' + unit.text(ends[0]) + ' and ' + unit.full(ends[1]) + '.' if ends else ''}"
     )
     enlarged = f"The band measured from its median, {between}; the same numbers are in the table below."
+    title, clips = "Contour, with band, contact points, gap and pivot", ("contour-clip", "detail-clip")
     chosen = np.linspace(0, x.size - 1, _TABLED).round().astype(int)
     return ContourFigure(
-        figure("contour-map", title, description, height, *overview.drawn("contour-clip")),
-        figure("band-detail", "The band, enlarged", enlarged, _DETAIL_HEIGHT, *detail.drawn("detail-clip")),
-        legend(entries),
+        figure("contour-map", title, description, height, *overview.drawn(clips[0])),
+        figure("band-detail", "The band, enlarged", enlarged, _DETAIL_HEIGHT, *detail.drawn(clips[1])),
+        legend([*entries, *more]),
         places,
         [rows[i] for i in chosen],
         unit,
     )
 
 
-def _put_contacts(overview: Plot, findings: ContourFindings, x: Floats) -> list[tuple[str, str]]:
-    contacts = findings.contacts
-    if contacts is None:
-        return []
-    at_x, at_y = contacts["contact_x"].values, contacts["contact_y"].values
-    good = contacts_within(contacts, x[0], x[-1])
-    entries = []
-    for phase, name in (("tip", "tip contact"), ("tangential", "tangential contact")):
-        chosen = good & (contacts["contact_phase"].values == phase)
-        if chosen.any():
-            places = overview.x(at_x[chosen]), overview.y(at_y[chosen])
-            overview.put(dots(*places, 2.2, f"contact {phase}", square=phase == "tangential"))
-            entries.append((f"key-{phase}", f"{name} ({np.count_nonzero(chosen)})"))
-    return entries
+def _overview(
+    findings: ContourFindings, bases: Floats, unit: Shown, ends: tuple[float, float] | None
+) -> tuple[Plot, float, list[tuple[str, str]]]:
+    """Return the map, its height, and the entries of its legend."""
+    x, lower, median, upper = (findings.band[name].values for name in ("x", "lower", "median", "upper"))
+    plot, height = Plot.map_of(np.r_[x, bases[:, 0]], np.r_[median, bases[:, 1]], unit)
+    entries = [("key-band", f"{percent(findings.probability)} band"), ("key-median", "median")]
+    if ends:
+        plot.stretch(*ends, "gap")
+        entries.append(("key-gap", "gap, touched by neither sweep"))
+    plot.area(x, lower, upper, "band")
+    plot.path(x, median, "median")
+    if (contacts := findings.contacts) is not None:
+        good = contacts_within(contacts, x[0], x[-1])
+        for phase, name in (("tip", "tip contact"), ("tangential", "tangential contact")):
+            some = contacts.isel(sample=good & (contacts["contact_phase"].values == phase))
+            if count := some.sizes["sample"]:
+                places = plot.x(some["contact_x"].values), plot.y(some["contact_y"].values)
+                plot.put(dots(*places, 2.2, f"contact {phase}", square=phase == "tangential"))
+                entries.append((f"key-{phase}", f"{name} ({count})"))
+    if findings.overlay is not None:
+        put_overlay(plot, findings.overlay)
+        entries.append(("key-overlay", findings.overlay.name))
+    plot.put_pivots(bases)
+    word = "base, at the beginning" if carried_sweeps(findings.record) else "pivot" if len(bases) == 1 else "pivots"
+    diamond = element("path", d="M-7 0L0 -7L7 0L0 7Z")
+    plot.put(element("g", diamond, id="band-mark", class_="place js-only", transform="translate(-20 -20)"))
+    last = ("key-pivot", word), ("key-place js-only", "place along x, chosen below or beside")
+    return plot, height, [*entries, *last]
+
+
+def _detail(
+    findings: ContourFindings, x_label: str, unit: Shown, ends: tuple[float, float] | None
+) -> tuple[Plot, list[tuple[str, str]]]:
+    """Return the band, enlarged and measured from its median, and the entries of its legend."""
+    band, overlay, shape = findings.band, findings.overlay, findings.shape
+    x, median = band["x"].values, band["median"].values
+    off = np.stack([band["lower"].values - median, band["upper"].values - median])
+    other = None if overlay is None else overlay.polyline.height(x, median) - median
+    fine = shown_as("contact_x", band["lower"].attrs, off)
+    shown = off if other is None else np.stack([*off, np.clip(other, *(_MOST_OFF * np.nanmax(np.abs(off)) * _SIGNS))])
+    labels = x_label, f"y − median{fine.bracketed}"
+    plot = Plot.around(x, shown, labels, _DETAIL_HEIGHT, (unit.power, fine.power))
+    if ends:
+        plot.stretch(*ends, "gap")
+    plot.area(x, off[0], off[1], "band")
+    if shape is not None:
+        plot.area(x, shape["lower"] - shape["median"], shape["upper"] - shape["median"], "shape")
+    plot.path(x, np.zeros_like(x), "median")
+    if overlay is not None and other is not None:
+        put_overlay_band(plot, overlay, x, median)
+        plot.path(x, other, "overlay")
+    rule = {"y1": plot.y.end, "y2": plot.y.start, "x1": -20, "x2": -20}
+    plot.put(element("line", id="band-rule", class_="rule js-only", **rule))
+    return plot, [] if shape is None else [("key-shape", "that of the shape alone, up to a shift")]
 
 
 def _rows(x: Floats, lower: Floats, median: Floats, upper: Floats, unit: Shown) -> list[list[str]]:

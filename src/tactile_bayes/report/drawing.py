@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -72,8 +72,7 @@ class Scale:
 
 def scale_of(values: ArrayLike, start: float, end: float, room: float = 0.04) -> Scale:
     """Return a scale that holds all finite values, with a margin."""
-    known = np.asarray(values, dtype=float)
-    known = known[np.isfinite(known)]
+    known = np.ravel(values)[np.isfinite(np.ravel(values))]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     margin = room * (high - low) or 0.5 * abs(high) or 0.5
     return Scale(low - margin, high + margin, start, end)
@@ -137,13 +136,11 @@ class Plot:
         """Fill the area between two edges, in a piece for each run of points at which both are finite."""
         across, low, high = self.x(x), self.y(lower), self.y(upper)
         known = np.isfinite(across) & np.isfinite(low) & np.isfinite(high)
-        pieces = np.split(np.arange(known.size), np.flatnonzero(np.diff(known)) + 1)
-        outlines = [
-            _outline_path(np.r_[across[run], across[run][::-1]], np.r_[low[run], high[run][::-1]]) + "Z"
-            for run in pieces
-            if run.size and known[run[0]]
-        ]
-        self.put(element("path", d="".join(outlines), class_=class_))
+        outlines = ""
+        for run in np.split(np.arange(known.size), np.flatnonzero(np.diff(known)) + 1):
+            if known[run].any():
+                outlines += _outline_path(np.r_[across[run], across[run][::-1]], np.r_[low[run], high[run][::-1]]) + "Z"
+        self.put(element("path", d=outlines, class_=class_))
 
     def stretch(self, low: float, high: float, class_: str) -> None:
         """Shade a stretch in x, from bottom to top."""
@@ -174,28 +171,21 @@ class Plot:
 
 def _outline_path(x: Floats, y: Floats) -> str:
     """Return points in a drawing as path data, interrupted at points that are not finite."""
-    out, pen = [], "M"
+    out, pen = "", "M"
     for across, down in zip(np.round(x, 1), np.round(y, 1), strict=True):
-        if not (math.isfinite(across) and math.isfinite(down)):
-            pen = "M"
-            continue
-        out.append(f"{pen}{across:g} {down:g}")
-        pen = "L"
-    return "".join(out)
+        is_known = math.isfinite(across) and math.isfinite(down)
+        out += f"{pen}{across:g} {down:g}" if is_known else ""
+        pen = "L" if is_known else "M"
+    return out
 
 
-def dots(x: Sequence[float] | Floats, y: Sequence[float] | Floats, half: float, class_: str, *, square: bool) -> Markup:
+def dots(x: Floats, y: Floats, half: float, class_: str, *, square: bool) -> Markup:
     """Return many marks of one kind, squares or discs, as one path."""
-    data = []
-    for across, down in zip(x, y, strict=True):
-        if not (math.isfinite(across) and math.isfinite(down)):
-            continue
-        if square:
-            data.append(f"M{across - half:.1f} {down - half:.1f}h{2 * half:g}v{2 * half:g}h{-2 * half:g}z")
-        else:
-            arc = f"a{half:g} {half:g} 0 1 0"
-            data.append(f"M{across - half:.1f} {down:.1f}{arc} {2 * half:g} 0{arc} {-2 * half:g} 0")
-    return element("path", d="".join(data), class_=class_)
+    size, arc = 2 * half, f"a{half:g} {half:g} 0 1 0"
+    mark = f"h{size:g}v{size:g}h{-size:g}z" if square else f"{arc} {size:g} 0{arc} {-size:g} 0"
+    good, up = np.isfinite(x) & np.isfinite(y), half if square else 0.0
+    starts = zip(x[good] - half, y[good] - up, strict=True)
+    return element("path", d="".join(f"M{across:.1f} {down:.1f}{mark}" for across, down in starts), class_=class_)
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> Markup:

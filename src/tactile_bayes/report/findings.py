@@ -11,7 +11,7 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.assessment.trust import draws_digest
-from tactile_bayes.diagnostics.result_check import Check, check
+from tactile_bayes.diagnostics.result_check import Check, budget_if_any, check, probability_of
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.inference.stored_experiment import contact_points
@@ -21,7 +21,6 @@ from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.report.contour_figure import ContourFindings
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.budget import uncertainty_budget
 from tactile_bayes.uncertainty.overlay import read_overlay
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.rod_reach import reach
@@ -30,10 +29,7 @@ from tactile_bayes.uncertainty.summary import gap_if_any, summary
 FINDING_STEPS = 4  # number of steps that `findings_of` reports: posterior, contacts, check, and all the rest
 _GROUPS = ("posterior", "sample_stats", "posterior_predictive", "events", "observed_data", "constant_data", "prior")
 _SAID = ("family", "units", "friction", "nuisances", "priors", "settings", "seed", "message", "data_sha256")
-
-_COMPARISON = ("probability", "log_evidence", "p_value", "fits", "sampled")
-
-_USUAL = 0.95  # probability of intervals if a posterior does not state one
+COMPARISON = ("probability", "log_evidence", "p_value", "fits", "sampled")
 
 
 @dataclass(frozen=True)
@@ -69,8 +65,7 @@ def findings_of(
     same numbers.
     """
     path = posterior_in(run)
-    content = path.read_bytes()
-    posterior = contour_posterior(path)
+    sha256, posterior = hashlib.sha256(path.read_bytes()).hexdigest(), contour_posterior(path)
     record = record_of(posterior)
     comparison = _comparison_in(run, compare, str(posterior.attrs["data_sha256"]))
     trust = _trust_in(run, posterior)
@@ -95,30 +90,18 @@ def findings_of(
         interval=predictive_interval(posterior, probability),
         edges=edges,
         numbers=summary(posterior, probability, edges),
-        budget=_budget(posterior, probability),
+        budget=checked.budget if checked.is_well else budget_if_any(posterior),
         checked=checked,
         zero=zero,
         comparison=comparison,
         trust=trust,
-        posterior_sha256=hashlib.sha256(content).hexdigest(),
+        posterior_sha256=sha256,
         record_sha256=record_hash(record),
         probability=probability,
         overlay=other,
     )
     progress(FINDING_STEPS)
     return found
-
-
-def _budget(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
-    try:
-        return uncertainty_budget(posterior, probability)
-    except InferenceError:
-        return None
-
-
-def probability_of(posterior: xr.DataTree) -> float:
-    """Return the probability of bands and intervals of a run."""
-    return float(posterior.attrs.get("probability", _USUAL))
 
 
 def contour_posterior(path: Path) -> xr.DataTree:
@@ -153,7 +136,7 @@ def _comparison_in(run: Path, compare: Path | None, data_sha256: str) -> xr.Data
             return None
         raise InferenceError(f"{compare} holds no comparison.nc: {correction}")
     found = read_netcdf(path, xr.open_dataset, lambda what: InferenceError(f"{path} {what}: compare again"))
-    if "family" not in found.dims or not {*_COMPARISON} <= set(found.data_vars) or "verdict" not in found.attrs:
+    if "family" not in found.dims or not {*COMPARISON} <= set(found.data_vars) or "verdict" not in found.attrs:
         raise InferenceError(f"{path} is no comparison of shapes: {correction}")
     if "data_sha256" not in found.attrs:
         if compare is None:

@@ -25,54 +25,30 @@ _POINTS = 33
 
 @dataclass(frozen=True)
 class Frames:
-    """Rods along the most probable contour, at samples of a record, sweep after sweep; in the record's units.
+    """Rods along the most probable contour, at samples of a record, sweep after sweep; in the record's units."""
 
-    Attributes
-    ----------
-    contour : Contour
-        The contour of the draw with the highest posterior density.
-    samples : ndarray of int, shape (n,)
-        Numbers of the samples in the record.
-    sweep : ndarray of int, shape (n,)
-        Their sweeps.
-    rod_x, rod_y : ndarray, shape (n, points)
-        The rod, from pivot to tip.
-    contact_x, contact_y : ndarray, shape (n,)
-        Contact point on the object; NaN out of contact.
-    phase : ndarray of str, shape (n,)
-        "tip", "tangential", "none".
-    drive_angle : ndarray, shape (n,)
-        Slope of the rod at the pivot [rad].
-    cell_angle : ndarray, shape (n,)
-        Drive angle as read, corrected for the encoder's offset and backlash [rad]: the angle of a load cell that turns
-        with the drive. It differs from `drive_angle` by the deflection of a compliant suspension.
-    loads : ndarray, shape (n, 3)
-        Holding moment and support reaction in the laboratory frame, free of noise and of the cell's errors.
-    pivots : ndarray, shape (pivots, 2)
-        Pivots of that draw.
-    every : int
-        Every how many samples one is shown.
-    """
-
-    contour: Contour
-    samples: Index
-    sweep: Index
-    rod_x: Floats
+    contour: Contour  # of the draw with the highest posterior density
+    samples: Index  # numbers of the samples in the record, shape (n,)
+    sweep: Index  # their sweeps
+    rod_x: Floats  # the rod from pivot to tip, shape (n, points)
     rod_y: Floats
-    contact_x: Floats
+    contact_x: Floats  # contact point on the object, shape (n,); NaN out of contact
     contact_y: Floats
-    phase: NDArray[np.str_]
-    drive_angle: Floats
+    phase: NDArray[np.str_]  # "tip", "tangential" or "none"
+    drive_angle: Floats  # slope of the rod at the pivot [rad]
+    # Drive angle as read, without the encoder's offset and backlash [rad]: the angle of a load cell that turns with the
+    # drive. It differs from `drive_angle` by the deflection of a compliant suspension.
     cell_angle: Floats
-    loads: Floats
-    pivots: Floats
-    every: int
+    loads: (
+        Floats  # holding moment and support reaction in the laboratory frame, without the cell's errors, shape (n, 3)
+    )
+    pivots: Floats  # pivots of that draw, shape (pivots, 2)
+    every: int  # every how many samples one is shown
 
 
 def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Frames:
     """Return the rods of the most probable draw, with its rigidity, encoder, friction, suspension and pivots."""
-    record = record_of(posterior)
-    draw = best_draw(posterior)
+    record, draw = record_of(posterior), best_draw(posterior)
     contour = contours_of(draw, posterior.attrs["family"])
     likelihood, unknowns = likelihood_of(posterior, record)
     rig = unknowns.rig({name: np.atleast_1d(draw[name].values) for name in unknowns.names})

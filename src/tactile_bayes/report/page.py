@@ -7,27 +7,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.record import carried_sweeps, present_channels
 from tactile_bayes.report.background import background_of
 from tactile_bayes.report.contour_figure import contour_figure, gap_ends
-from tactile_bayes.report.findings import Findings
+from tactile_bayes.report.findings import COMPARISON, Findings
 from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
 from tactile_bayes.report.overlay import note_of, overlay_table
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
-from tactile_bayes.report.trust import (
-    causes_table,
-    check_messages,
-    check_table,
-    contacts_messages,
-    convergence,
-    trust_tables,
-)
-from tactile_bayes.report.wording import PageTable, chance, fixed, percent, sentence, shown_as, spread
-
-_WIDTH = "width of the band"
+from tactile_bayes.report.trust import trust_of
+from tactile_bayes.report.wording import PageTable, chance, fixed, percent, rows_of, sentence, shown_as, spread
 
 
 def page_of(findings: Findings, name: str) -> dict[str, Any]:
@@ -35,79 +25,63 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
     attrs = findings.posterior.attrs
     motion = motion_of(findings.posterior)
     contour, readings = contour_figure(findings), readings_figure(findings, motion)
-    channels, stats = present_channels(findings.record), findings.posterior["sample_stats"].to_dataset()
-    heads = [
-        f"{label} [{unit}]" if unit else label for channel, label, unit in readings.channels if channel in channels
-    ]
+    present, parameters = present_channels(findings.record), findings.numbers["quantity"].values
+    heads = [f"{label} [{unit}]" if unit else label for name, label, unit in readings.channels if name in present]
     travel = [] if readings.travel_unit is None else [f"travel{readings.travel_unit}"]
-    first = readings.data["first"]
-    return background_of(findings) | {
+    frame = {key: values[readings.data["first"]] for key, values in readings.data["said"].items()}
+    heads = ["sample", "sweep", "φ₀ [°]", *travel, *heads]
+    positions = f"The band at some positions{contour.unit.bracketed}"
+    return {
+        **background_of(findings),
+        **trust_of(findings),
         "name": name,
         "record_file": str(attrs.get("record_file", "")),
         "family": str(attrs["family"]),
         "formula": FORMULAS.get(attrs["family"], "flanks of two shapes, " + str(attrs["family"])),
         "share": percent(findings.probability),
         "answer": _answer(findings),
-        "budget": _budget(findings),
+        "budget": _budget(findings.budget),
         "dimensionless": attrs["units"] == "dimensionless",
         "contour": contour,
-        "band_table": PageTable(
-            f"The band at some positions{contour.unit.bracketed}", ["x", "lower", "median", "upper"], contour.rows, 0
-        ),
+        "band_table": PageTable(positions, ["x", "lower", "median", "upper"], contour.rows, 0),
         "overlay": findings.overlay and overlay_table(findings.band, findings.overlay),
         "overlay_notes": [] if findings.overlay is None else note_of(findings.overlay, findings.band),
         "gap": _gap_messages(findings),
         "shapes": _shapes(findings.comparison),
         "parameters": _parameters(findings, mute=True),
-        "is_well": _is_well(findings),
-        "verdicts": [said for said in findings.checked.messages if said.kind != _WIDTH],
-        "width": [said for said in findings.checked.messages if said.kind == _WIDTH],
-        "trust": [] if findings.trust is None else str(findings.trust.attrs["words"]).splitlines(),
-        "trust_summary": "" if findings.trust is None else str(findings.trust.attrs["summary"]),
-        "trust_tables": trust_tables(findings),
-        "convergence_head": f"Have the {'particles moved enough' if is_streamed(attrs) else 'ensembles converged'}?",
-        "convergence": convergence(findings),
-        "check_messages": check_messages(findings),
-        "check": check_table(findings),
-        "causes": causes_table(findings),
-        "contacts": contacts_messages(findings),
         "readings": readings,
-        "frame": {key: values[first] for key, values in readings.data["said"].items()},
-        "moving": [
-            (channel, label, unit, readings.data["said"][channel][first]) for channel, label, unit in readings.channels
-        ],
+        "frame": frame,
+        "moving": [(channel, label, unit, frame[channel]) for channel, label, unit in readings.channels],
         "motion_every": motion.every,
-        "all_readings": PageTable("The readings", ["sample", "sweep", "φ₀ [°]", *travel, *heads], readings.rows, 0),
-        "everything": _parameters(findings, mute=False) if any(map(is_direction, stats.parameter.values)) else None,
+        "all_readings": PageTable("The readings", heads, readings.rows, 0),
+        "everything": _parameters(findings, mute=False) if any(map(is_direction, parameters)) else None,
         "approximations": str(attrs.get("approximations", "")),
         "command": command_of(attrs),
         "python": python_lines(attrs),
-        "hindrances": hindrances(findings.posterior, findings.record),
+        "hindrances": hindrances(attrs),
         "data": {"band": contour.band, "frames": readings.data},
     }
 
 
-def _budget(findings: Findings) -> PageTable | None:
+def _budget(budget: xr.Dataset | None) -> PageTable | None:
     """Return how much of the band's width each unknown accounts for, the largest share first."""
-    budget = findings.budget
     if budget is None:
         return None
-    widths = [budget[name] for name in ("half_width", "half_width_if_all_known", "half_width_of_shape")]
-    unit = shown_as("contact_x", budget.half_width.attrs, [float(widths[0])])
-    rows = [["as it is", "", unit.text(float(widths[0]), 3)]]
-    order = np.argsort(-budget["share"].values, kind="stable")
-    for name, share, known in zip(
-        *(budget[column].values[order] for column in ("unknown", "share", "half_width_if_known")), strict=True
-    ):
-        rows.append([f"{name} known", percent(round(share, 2)), unit.text(known, 3)])
-    rows.append(["all of them known", "", unit.text(float(widths[1]), 3)])
-    rows.append(["of the shape alone, up to a shift", "", unit.text(float(widths[2]), 3)])
+    names = ("half_width", "half_width_if_all_known", "half_width_of_shape")
+    width, known, shape = (float(budget[name]) for name in names)
+    unit = shown_as("contact_x", budget.half_width.attrs, [width])
+    ordered = budget.isel(unknown=np.argsort(-budget["share"].values, kind="stable"))
+    rows = [
+        ["as it is", "", unit.text(width, 3)],
+        *(
+            [f"{name} known", percent(round(share, 2)), unit.text(narrowed, 3)]
+            for name, share, narrowed in rows_of(ordered, "unknown", "share", "half_width_if_known")
+        ),
+        ["all of them known", "", unit.text(known, 3)],
+        ["of the shape alone, up to a shift", "", unit.text(shape, 3)],
+    ]
     heads = ["the band", "share of the variance", f"half width{unit.bracketed}"]
     return PageTable("What sets the width of the band: its median half width along normals", heads, rows)
-
-
-def _is_well(findings: Findings) -> bool:
-    return findings.checked.is_well
 
 
 def _answer(findings: Findings) -> str:
@@ -130,12 +104,13 @@ def _answer(findings: Findings) -> str:
             f"{reach} the posterior has a {share} band {widths} It would hold if the contour were of this family and "
             "the rig as assumed, but the record contradicts one of the two: the error of the band is unknown."
         )
-    if not _is_well(findings):
+    if not findings.checked.is_well:
         return f"{reach} the posterior has a {share} band {widths} Its validity depends on the messages above."
     return f"{reach} the contour is known to within a {share} band {widths}"
 
 
 def _gap_messages(findings: Findings) -> list[str]:
+    """Return sentences on the gap, and on how far convexity confines the contour in it."""
     edges = findings.edges
     if edges is None and carried_sweeps(findings.record):
         events = findings.posterior["events"].to_dataset()
@@ -153,17 +128,14 @@ def _gap_messages(findings: Findings) -> list[str]:
     scale = 10.0**unit.power
     values = [float(width.sel(bound=bound)) / scale for bound in ("median", "lower", "upper")]
     middle, low, high = spread(values, values[2] - values[1])
-    share = percent(findings.probability)
-    would_be = "would be" if findings.is_rejected else "is"
-    of_such = "on such a contour " if findings.is_rejected else ""
-    if gap_ends(findings) is None:
-        overlap = f"{middle.removeprefix('−')} {unit.name}".rstrip()
-        words = f"no gap {would_be} left: the sweeps overlap by {overlap}."
+    share, has_gap, name = percent(findings.probability), gap_ends(findings) is not None, f" {unit.name}".rstrip()
+    of_such, would_be = ("on such a contour ", "would be") if findings.is_rejected else ("", "is")
+    if has_gap:
+        words = f"the gap, which no sweep touches, {would_be} {middle}{name} wide ({share} from {low} to {high}{name})."
     else:
-        wide, range_ = f"{middle} {unit.name}".rstrip(), f"{low} to {high} {unit.name}".rstrip()
-        words = f"the gap, which no sweep touches, {would_be} {wide} wide ({share} from {range_})."
+        words = f"no gap {would_be} left: the sweeps overlap by {middle.removeprefix('−')}{name}."
     said = [sentence(of_such + words)]
-    if gap_ends(findings) is not None and not findings.is_rejected:
+    if has_gap and not findings.is_rejected:
         certificate = float(np.max(edges["triangle_upper"].values - edges["triangle_lower"].values))
         band = float(edges["band_width"])
         if np.isfinite(certificate) and np.isfinite(band):
@@ -183,14 +155,11 @@ def _gap_messages(findings: Findings) -> list[str]:
 def _shapes(comparison: xr.Dataset | None) -> dict[str, Any] | None:
     if comparison is None:
         return None
-    order = np.argsort(-np.nan_to_num(comparison["probability"].values), kind="stable")
+    ordered = comparison.isel(family=np.argsort(-np.nan_to_num(comparison["probability"].values), kind="stable"))
     rows, bars = [], []
-    for k in order:
-        row = comparison.isel(family=k)
-        name, probability = str(row["family"].values), float(row["probability"])
-        fits = "not sampled" if not bool(row["sampled"]) else "yes" if bool(row["fits"]) else "no"
-        evidence, p_value = fixed(float(row["log_evidence"]), ".1f"), chance(float(row["p_value"]))
-        rows.append([name, chance(probability), evidence, p_value, fits])
+    for name, probability, evidence, p_value, fits, is_sampled in rows_of(ordered, "family", *COMPARISON):
+        said = "not sampled" if not is_sampled else "yes" if fits else "no"
+        rows.append([name, chance(probability), fixed(evidence, ".1f"), chance(p_value), said])
         bars.append((name, probability if np.isfinite(probability) else 0.0, chance(probability)))
     heads = ["shape", "probability", "log evidence", "check p", "fits"]
     return {
@@ -203,13 +172,10 @@ def _shapes(comparison: xr.Dataset | None) -> dict[str, Any] | None:
 def _parameters(findings: Findings, *, mute: bool) -> PageTable:
     family = str(findings.posterior.attrs["family"])
     rows = []
-    for name in findings.numbers["quantity"].values:
-        if mute and is_direction(name):
-            continue
-        row = findings.numbers.sel(quantity=name)
-        cells = parameter_cells(row, family)
-        cells += [fixed(float(row["r_hat"]), ".3f"), *(fixed(float(row[c]), ".0f") for c in ("ess_bulk", "ess_tail"))]
-        rows.append(cells)
+    for r_hat, *sizes, name in rows_of(findings.numbers, "r_hat", "ess_bulk", "ess_tail", "quantity"):
+        if not (mute and is_direction(name)):
+            cells = parameter_cells(findings.numbers.sel(quantity=name), family)
+            rows.append([*cells, fixed(r_hat, ".3f"), *(fixed(size, ".0f") for size in sizes)])
     share = percent(findings.probability)
     heads = ["quantity", "meaning", "unit", "estimate", f"{share} from", "to", "R̂", "ESS bulk", "ESS tails"]
     caption = "Estimates are medians, intervals central" if mute else "All parameters, and the gap"

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.stored_experiment import segments_of
-from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
+from tactile_bayes.plotting.drive_axis import drive_axis
 from tactile_bayes.plotting.maps import outline
 from tactile_bayes.record import CHANNELS, bases_of, carried_sweeps, frame_of, present_channels, travels_of, turned
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
@@ -22,15 +22,23 @@ from tactile_bayes.report.wording import Shown, percent, shown_as
 
 _WORDS = {"holding_moment": "holding moment", "force_x": "force x", "force_y": "force y"}
 _TURNING = {"force_x": "force along the rod", "force_y": "force across the rod"}
-
-_AXES = {"holding_moment": "moment", "force_x": "force x", "force_y": "force y"}
-_TURNING_AXES = {"force_x": "along", "force_y": "across"}
-
+# Channels beside an axis, by their words.
+_SHORT = {"holding moment": "moment", "force along the rod": "along", "force across the rod": "across"}
 _READINGS_HEIGHT = 190.0
-
 _ARROW = 110.0  # length of the largest force
 # Largest number of samples drawn of each channel; of a longer record every second, or third, and so on.
 _MOST_DOTS = 1500
+
+
+# Legend of the rods: classes and texts.
+_RODS = (
+    ("key-object", "object, by the most probable contour"),
+    ("key-rod", "rod"),
+    ("key-tip", "tip contact"),
+    ("key-tangential", "tangential contact"),
+    ("key-force", "support reaction at the pivot, contact force at the contact"),
+    ("key-moment", "holding moment"),
+)
 
 
 class ReadingsFigure(NamedTuple):
@@ -66,7 +74,9 @@ def readings_figure(findings: Findings, motion: Frames) -> ReadingsFigure:
     }
     force = np.hypot(motion.loads[:, 1], motion.loads[:, 2])
     first = int(np.argmax(np.where(motion.sweep == motion.sweep[0], force, -1.0)))
-    rods, data = _rods(findings, motion, first)
+    about = np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()])
+    length = shown_as("contact_x", record["base_x"].attrs, about)
+    rods, data = _rods(motion, first, length)
     plots, drawings, every = _readings(findings, shown, int(motion.samples[first]))
     across = next(iter(plots.values())).x
     data["angle"] = [across.at(value) for value in drive_axis(record).values[motion.samples]]
@@ -74,39 +84,24 @@ def readings_figure(findings: Findings, motion: Frames) -> ReadingsFigure:
         name: [None if not np.isfinite(value) else plot.y.at(value) for value in record[name].values[motion.samples]]
         for name, plot in plots.items()
     }
-    data["said"], rows = _said(findings, motion, shown, bent)
+    data["said"], rows = _said(findings, motion, shown, bent, length)
     data["sweeps"] = [
         {"name": _sweep_name(record, number), "frames": np.flatnonzero(motion.sweep == number).tolist()}
         for number in dict.fromkeys(motion.sweep.tolist())
     ]
     data["first"] = first
     senses = [sense for sense in ("forward", "backward") if sense in record.direction.values]
-    entries = [(f"key-{sense}", f"reading, {sense} sweep") for sense in senses]
-    entries += [
+    entries = [
+        *((f"key-{sense}", f"reading, {sense} sweep") for sense in senses),
         ("key-unloaded", "certainly unloaded (pale)"),
         ("key-predicted", f"{percent(findings.probability)} of what the posterior predicts"),
         ("key-event", "first contact and snap-off, medians"),
     ]
+    channels = [(name, words[name], shown[name].name) for name in CHANNELS]
+    travel_unit = length.bracketed if carried_sweeps(record) else None
+    together = Markup("").join(drawings)
     return ReadingsFigure(
-        rods,
-        Markup("").join(drawings),
-        legend(
-            [
-                ("key-object", "object, by the most probable contour"),
-                ("key-rod", "rod"),
-                ("key-tip", "tip contact"),
-                ("key-tangential", "tangential contact"),
-                ("key-force", "support reaction at the pivot, contact force at the contact"),
-                ("key-moment", "holding moment"),
-            ]
-        ),
-        legend(entries),
-        [(name, words[name], shown[name].name) for name in CHANNELS],
-        data,
-        rows,
-        _length(findings, motion).bracketed if carried_sweeps(record) else None,
-        shown,
-        every,
+        rods, together, legend(_RODS), legend(entries), channels, data, rows, travel_unit, shown, every
     )
 
 
@@ -127,11 +122,9 @@ def _in_frame(findings: Findings, motion: Frames) -> Floats:
     return np.stack([moment, *turned(force_x, force_y, motion.cell_angle)], axis=-1)
 
 
-def _rods(findings: Findings, motion: Frames, first: int) -> tuple[Markup, dict[str, Any]]:
+def _rods(motion: Frames, first: int, unit: Shown) -> tuple[Markup, dict[str, Any]]:
     """Return the map of the rod in one frame, and all frames, in the drawing's own units."""
-    attrs = findings.record["base_x"].attrs
     x, y = motion.rod_x, motion.rod_y
-    unit = shown_as("contact_x", attrs, np.concatenate([x.ravel(), y.ravel()]))
     plot, height = Plot.map_of(x.ravel(), y.ravel(), unit)
     along, up = outline(motion.contour, plot.x.low, plot.x.high)
     up = np.minimum(up, plot.y.high + 1.0 * (plot.y.high - plot.y.low))
@@ -193,38 +186,41 @@ def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tupl
     along, sweep = drive_axis(record), record.sweep.values
     angle = along.values
     length = shown_as("contact_x", along.attrs, angle)
-    name_of_axis, power = {
-        "angle": ("drive angle φ₀ [°]", 0),
-        "travel": (f"travel of the base{length.bracketed}", length.power),
-        "sample": ("sample", 0),
+    travelled = f"the travel of the base from {length.text(angle.min())} to {length.full(angle.max())}"
+    name_of_axis, power, over = {
+        "angle": ("drive angle φ₀ [°]", 0, f"the drive angle from {angle.min():.4g} to {angle.max():.4g} degrees"),
+        "travel": (f"travel of the base{length.bracketed}", length.power, travelled),
+        "sample": ("sample", 0, "the number of the sample"),
     }[along.kind]
     unloaded, direction = findings.zero.unloaded.values, record.direction.values
     every = max(1, -(-angle.size // _MOST_DOTS))
     kept = np.arange(angle.size) % every == 0
     events = findings.posterior["events"].to_dataset().median(("chain", "draw"))
-    axes = _AXES | (_TURNING_AXES if frame_of(record) == "turning" else {})
+    rules = [
+        along.place_of(events.isel(segment=k), event, own)
+        for event in ("first", "snap_off")
+        for k, own in enumerate(segments_of(findings.posterior, record).samples)
+    ]
     plots, drawings = {}, []
     for name in present_channels(record):
         values = record[name].values
         bounds = [interval[f"{name}_{edge}"].values for edge in ("lower", "upper")]
         unit = shown[name]
-        labels = name_of_axis, f"{axes[name]}{unit.bracketed}"
+        labels = name_of_axis, f"{_SHORT.get(words[name], words[name])}{unit.bracketed}"
         plot = Plot.around(angle, np.concatenate([values, *bounds]), labels, _READINGS_HEIGHT, (power, unit.power))
         for number in np.unique(sweep):
             rows = np.flatnonzero((sweep == number) & kept)
             rows = rows[np.argsort(angle[rows], kind="stable")]
             plot.area(angle[rows], bounds[0][rows], bounds[1][rows], "predicted")
         plot.path([plot.x.low, plot.x.high], [0.0, 0.0], "zero")
-        for start in along.starts:
-            plot.path([start, start], [plot.y.low, plot.y.high], "zero")
-        for event in ("first", "snap_off"):
-            for at in _places(findings, along, events, event):
-                plot.path([at, at], [plot.y.low, plot.y.high], "event")
+        for places, class_ in ((along.starts, "zero"), (rules, "event")):
+            for at in places:
+                plot.path([at, at], [plot.y.low, plot.y.high], class_)
         for sense, pale in product(("forward", "backward"), (" unloaded", "")):
             rows = np.flatnonzero(kept & (direction == sense) & (unloaded == bool(pale)))
             if rows.size:
-                places = plot.x(angle[rows]), plot.y(values[rows])
-                plot.put(dots(*places, 1.8, f"reading {sense}{pale}", square=sense == "backward"))
+                at_x, at_y = plot.x(angle[rows]), plot.y(values[rows])
+                plot.put(dots(at_x, at_y, 1.8, f"reading {sense}{pale}", square=sense == "backward"))
         across = plot.x.at(angle[here])
         ends = {"x1": across, "x2": across, "y1": plot.y.end, "y2": plot.y.start}
         plot.put(
@@ -232,42 +228,23 @@ def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tupl
             element("circle", class_="mark moving", cx=across, cy=plot.y.at(values[here]), r=5, data_channel=name),
         )
         plots[name] = plot
-        title = f"Readings: {words[name]}"
-        over = {
-            "angle": f"over the drive angle from {angle.min():.4g} to {angle.max():.4g} degrees",
-            "travel": f"over the travel of the base from {length.text(angle.min())} to {length.full(angle.max())}",
-            "sample": "over the number of the sample",
-        }[along.kind]
         description = (
-            f"{words[name].capitalize()} of {angle.size} samples {over}, over what the posterior predicts; "
+            f"{words[name].capitalize()} of {angle.size} samples over {over}, over what the posterior predicts; "
             "all numbers are in the table below."
         )
-        identity = f"readings-{name.replace('_', '-')}"
+        identity, title = f"readings-{name.replace('_', '-')}", f"Readings: {words[name]}"
         drawings.append(figure(identity, title, description, _READINGS_HEIGHT, *plot.drawn(f"{identity}-clip")))
     return plots, drawings, every
 
 
-def _places(findings: Findings, along: DriveAxis, events: xr.Dataset, event: str) -> list[float]:
-    """Return where an event of every sweep segment is drawn."""
-    samples = segments_of(findings.posterior, findings.record).samples
-    return [along.place_of(events.isel(segment=k), event, own) for k, own in enumerate(samples)]
-
-
-def _length(findings: Findings, motion: Frames) -> Shown:
-    """Return the unit in which lengths beside the rod are shown."""
-    about = np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()])
-    return shown_as("contact_x", findings.record["base_x"].attrs, about)
-
-
 def _said(
-    findings: Findings, motion: Frames, shown: Mapping[str, Shown], bent: Floats
+    findings: Findings, motion: Frames, shown: Mapping[str, Shown], bent: Floats, length: Shown
 ) -> tuple[dict[str, Any], list[list[str]]]:
     """Return the entries of the table beside the rod in every frame, and a table of all readings."""
     record, interval, present = findings.record, findings.interval, present_channels(findings.record)
     angles = [f"{angle:.2f}".replace("-", "−") for angle in np.degrees(record.drive_angle.values[motion.samples])]
     carried = np.isin(record.sweep.values, carried_sweeps(record))
     travels = travels_of(record)
-    length = _length(findings, motion)
     frames: dict[str, Any] = {
         "angle": angles,
         "sample": motion.samples.tolist(),

@@ -6,8 +6,6 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
-import xarray as xr
-
 from tactile_bayes.distributions import UNWRITTEN
 from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.tasks.documents import read_json
@@ -22,14 +20,11 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     """Return lines of Python that infer the posterior again from the record in its file, and compare the draws."""
     seed, settings = str(attrs["seed"]), read_json(attrs["settings"], "settings")
     streamed = is_streamed(attrs)
-    options = [
-        "family=tb.Family.of(stored)",
-        "rig=tb.Rig.of(stored)",
-        f"rng={_seed(seed)}",
-        *([] if streamed else ["settings=tb.SamplerSettings("]),
-        *(f"{'' if streamed else '    '}{name}={value!r}," for name, value in settings.items()),
-        *([] if streamed else [")"]),
-    ]
+    options = ["family=tb.Family.of(stored),", "rig=tb.Rig.of(stored),", f"rng={_seed(seed)},"]
+    if streamed:
+        options += [f"{name}={value!r}," for name, value in settings.items()]
+    else:
+        options += ["settings=tb.SamplerSettings(", *(f"    {n}={v!r}," for n, v in settings.items()), "),"]
     lines = [
         *(["import numpy as np"] if not seed.isdigit() else []),
         "import tactile_bayes as tb",
@@ -39,7 +34,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
         'columns = [stored[group].to_dataset() for group in ("constant_data", "observed_data")]',
         "record = xr.merge(columns).assign_attrs(stored.attrs)",
         *(["stream = tb.Stream("] if streamed else ["again = tb.infer_contour(", "    record,"]),
-        *(f"    {option}" if option.endswith(("(", ",")) else f"    {option}," for option in options),
+        *(f"    {option}" for option in options),
         ")",
         *(["stream.update(record)", "again = stream.posterior()"] if streamed else []),
         'print(again["posterior"].equals(stored["posterior"]))',
@@ -47,14 +42,12 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     return "\n".join(lines)
 
 
-def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
+def hindrances(attrs: Mapping[Any, Any]) -> list[str]:
     """Return reasons why the lines of Python may not give the same draws."""
-    attrs = posterior.attrs
-    settings = read_json(attrs["settings"], "settings")
     found = []
     if is_streamed(attrs):
         found.append("The samples came in blocks: taken at once, they give other draws of the same posterior.")
-    if settings.get("max_seconds") is not None:
+    if read_json(attrs["settings"], "settings").get("max_seconds") is not None:
         found.append("The run could end by the clock, after max_seconds: then the number of its steps is not repeated.")
     if "interrupted" in attrs["message"]:
         found.append("The run was interrupted: without an interrupt it makes more steps.")

@@ -16,15 +16,15 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.result_check import check
+from tactile_bayes.diagnostics.result_check import check, probability_of
 from tactile_bayes.errors import InferenceError, ParameterError, TactileBayesError
 from tactile_bayes.inference.result import record_of
 from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.record.netcdf import read_netcdf
-from tactile_bayes.report.findings import contour_posterior, probability_of
+from tactile_bayes.report.findings import contour_posterior
 from tactile_bayes.report.overlay import DISTANCE_HEADS, Laid, distance_cells, note_of
 from tactile_bayes.report.runs_figure import runs_figure
-from tactile_bayes.report.wording import PageTable, percent, shown_as, spread
+from tactile_bayes.report.wording import PageTable, percent, rows_of, shown_as, spread
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.runs.names import MANY
 from tactile_bayes.uncertainty.band import contour_band
@@ -79,8 +79,7 @@ def folders_of(runs: Sequence[Path]) -> dict[Path, str]:
             found[run] = ""
         elif (run / _TABLE).is_file():
             table = read_netcdf(run / _TABLE, xr.open_dataset, lambda what: InferenceError(f"{what}: infer again"))
-            rows = zip(table["record"].values.tolist(), table["error"].values.tolist(), strict=True)
-            found |= {run / name: error for name, error in rows}
+            found |= {run / name: error for name, error in rows_of(table, "record", "error")}
         elif inside := sorted(path.parent for path in run.glob("*/posterior.nc")):
             found |= dict.fromkeys(inside, "")
         else:

@@ -3,84 +3,94 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tactile_bayes.calibration.summary import CLAIMS
 from tactile_bayes.diagnostics.predictive_check import DISCREPANCIES
 from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.reconstruction import AXIAL_ALARM
-from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels
+from tactile_bayes.record import carried_sweeps, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_names
-from tactile_bayes.report.wording import PageTable, chance, fixed, percent, sentence, shown_as
+from tactile_bayes.report.wording import PageTable, chance, fixed, percent, rows_of, sentence, shown_as
 from tactile_bayes.tasks.documents import read_json
 
+_WIDTH = "width of the band"  # kind of a finding that is none against the result
 
-def convergence(findings: Findings) -> list[str]:
+
+def trust_of(findings: Findings) -> dict[str, Any]:
+    """Return what is said on trust, by names in the template."""
+    found, said = findings.trust, findings.checked.messages
+    attrs = {"words": "", "summary": ""} if found is None else found.attrs
+    moved_enough = "particles moved enough" if is_streamed(findings.posterior.attrs) else "ensembles converged"
+    return {
+        "is_well": findings.checked.is_well,
+        "verdicts": [finding for finding in said if finding.kind != _WIDTH],
+        "width": [finding for finding in said if finding.kind == _WIDTH],
+        "trust": str(attrs["words"]).splitlines(),
+        "trust_summary": str(attrs["summary"]),
+        "trust_tables": [] if found is None else _trust_tables(found),
+        "convergence_head": f"Have the {moved_enough}?",
+        "convergence": _convergence(findings),
+        "check_messages": _check_messages(findings),
+        "check": _check_table(findings),
+        "causes": _causes_table(findings),
+        "contacts": contacts_messages(findings),
+    }
+
+
+def _convergence(findings: Findings) -> list[str]:
     """Return sentences on the end of the run and on its ensembles."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].to_dataset()
     said = [sentence(f"{attrs['message']}.")]
     if is_streamed(attrs):
         return said
-    draws = stats.sizes["chain"] * stats.sizes["draw"]
-    said.append(
-        f"{stats.sizes['chain']} independent ensembles of {int(stats.attrs['walkers'])} walkers made {draws} draws; "
-        f"they accepted {', '.join(percent(round(float(rate), 2)) for rate in stats['acceptance_rate'].values)} of "
-        "their proposals."
-    )
-    return said
+    chains, rates = stats.sizes["chain"], stats["acceptance_rate"].values.tolist()
+    return [
+        *said,
+        f"{chains} independent ensembles of {int(stats.attrs['walkers'])} walkers made {chains * stats.sizes['draw']} "
+        f"draws; they accepted {', '.join(percent(round(rate, 2)) for rate in rates)} of their proposals.",
+    ]
 
 
-def trust_tables(findings: Findings) -> list[PageTable]:
-    """Return the tables of `tactile-bayes trust`: parts, claims, effect of the prior; none if it was not run."""
-    found = findings.trust
-    if found is None:
-        return []
+def _trust_tables(found: xr.Dataset) -> list[PageTable]:
+    """Return the tables of `tactile-bayes trust`: parts, claims, other assumptions, effect of the prior."""
     parts = []
-    for name in found["part"].values:
-        row = found.sel(part=name)
-        moves = row["moves"].values
-        most = "" if np.isnan(moves).all() else str(found["parameter"].values[np.nanargmax(np.abs(moves))])
-        by = fixed(float(np.nanmax(np.abs(moves))), ".1f") if most else ""
-        parts.append([str(name), chance(float(row["part_p_value"])), fixed(float(row["part_sd"]), ".1f"), by, most])
+    for name, p_value, sd, moves in rows_of(found, "part", "part_p_value", "part_sd", "moves"):
+        sizes, most = np.abs(moves), ["", ""]
+        if np.isfinite(sizes).any():
+            most = [fixed(float(np.nanmax(sizes)), ".1f"), str(found["parameter"].values[np.nanargmax(sizes)])]
+        parts.append([name, chance(p_value), fixed(sd, ".1f"), *most])
     heads = ["this part alone", "p", "off by [sd]", "moves by [sd]", "most"]
     tables = [PageTable("Prediction of the rest of the record by each part", heads, parts)]
     if "claim" in found.dims:
         claims = [
-            [CLAIMS[str(name)], f"{percent(round(share, 3))} ± {percent(round(error, 3))}", str(int(count))]
-            for name, share, error, count in zip(
-                found["claim"].values,
-                found["coverage"].values,
-                found["coverage_error"].values,
-                found["coverage_replicates"].values,
-                strict=True,
+            [CLAIMS[name], f"{percent(round(share, 3))} ± {percent(round(error, 3))}", str(int(count))]
+            for name, share, error, count in rows_of(
+                found, "claim", "coverage", "coverage_error", "coverage_replicates"
             )
         ]
         stated = f"stated with {percent(float(found.attrs['probability']))}"
         tables.append(PageTable("Records like this one, simulated and inferred", [stated, "holds in", "of"], claims))
     if "assumption" in found.dims:
         others = [
-            [
-                str(row["assumption"].values),
-                *(fixed(float(row[f"moved_{region}"]), ".2f") for region in ("in_gap", "beside")),
-                "yes" if int(row["fits"]) else "no",
-            ]
-            for row in (found.isel(assumption=k) for k in range(found.sizes["assumption"]))
+            [name, fixed(in_gap, ".2f"), fixed(beside, ".2f"), "yes" if fits else "no"]
+            for name, in_gap, beside, fits in rows_of(found, "assumption", "moved_in_gap", "moved_beside", "fits")
         ]
         heads = ["assumption instead", "in the gap", "beside it", "fits"]
         tables.append(PageTable("Distance that the median of the band moves, over its width", heads, others))
     rows = [
-        [str(name), *(fixed(float(value), ".3f") for value in row), str(by)]
-        for name, row, by in zip(
-            found["quantity"].values, found["sensitivity"].values, found["set_by"].values, strict=True
-        )
+        [name, *(fixed(value, ".3f") for value in row), by]
+        for name, row, by in rows_of(found, "quantity", "sensitivity", "set_by")
     ]
     heads = ["quantity", "contour's prior", "rig's prior", "record", "set by"]
     return [*tables, PageTable("Sensitivity to prior and record (0.05 matters)", heads, rows)]
 
 
-def check_messages(findings: Findings) -> list[str]:
+def _check_messages(findings: Findings) -> list[str]:
     """Return sentences on the check of the record."""
     check = findings.checked.predictive
     if check is None:
@@ -93,50 +103,40 @@ def check_messages(findings: Findings) -> list[str]:
         f"p = {chance(float(check['overall_p_value']))}, the share of all, this one included, that are at least "
         "as far off."
     ]
-    outside, record = [], findings.record
-    words = channel_names(record)
-    for name in present_channels(record):
-        values = record[name].values
+    outside, words = [], channel_names(findings.record)
+    for name in present_channels(findings.record):
+        values = findings.record[name].values
         lower, upper = (findings.interval[f"{name}_{edge}"].values for edge in ("lower", "upper"))
         count = int(np.count_nonzero((values < lower) | (values > upper)))
         outside.append(f"{count} of {values.size} in {words[name]}")
-    expected = percent(round(1.0 - findings.probability, 9))
-    said.append(
-        f"Outside its {percent(findings.probability)} intervals are {', '.join(outside)}; {expected} would be usual."
-    )
-    return said
+    share, expected = percent(findings.probability), percent(round(1.0 - findings.probability, 9))
+    return [*said, f"Outside its {share} intervals are {', '.join(outside)}; {expected} would be usual."]
 
 
-def check_table(findings: Findings) -> PageTable | None:
+def _check_table(findings: Findings) -> PageTable | None:
     """Return the misfit by channel; None if there are too few draws."""
     check = findings.checked.predictive
     if check is None:
         return None
     record, rows = findings.record, []
     words, carried = channel_names(record), carried_sweeps(record)
-    for name in check["channel"].values:
+    for name in check["channel"].values.tolist():
         of_channel = check.sel(channel=name)
-        unit = shown_as(name, record[name].attrs, [float(of_channel["worst_residual"])])
-        sweep = int(of_channel["worst_sweep"])
+        residual, sweep = float(of_channel["worst_residual"]), int(of_channel["worst_sweep"])
         low, high = sorted(np.degrees([float(of_channel["worst_from"]), float(of_channel["worst_to"])]))
         stretch = f"{low:.0f}° to {high:.0f}°".replace("-", "−")
         if sweep in carried:
             travels = [float(of_channel[f"worst_{end}_travel"]) for end in ("from", "to")]
             length = shown_as("contact_x", record["base_x"].attrs, travels)
             stretch = f"{length.text(travels[0], 3)} to {length.full(travels[1], 3)} of travel"
-        rows.append(
-            [
-                words[str(name)],
-                *(chance(float(of_channel["p_value"].sel(discrepancy=d))) for d in DISCREPANCIES),
-                f"sweep {sweep}, {stretch}",
-                unit.full(float(of_channel["worst_residual"]), 2),
-            ]
-        )
+        off = shown_as(name, record[name].attrs, [residual]).full(residual, 2)
+        p_values = of_channel["p_value"].sel(discrepancy=list(DISCREPANCIES)).values.tolist()
+        rows.append([words[name], *map(chance, p_values), f"sweep {sweep}, {stretch}", off])
     heads = ["channel", *DISCREPANCIES, "worst stretch", "off there by"]
     return PageTable("Misfit by channel: shares of predicted records that are at least as discrepant", heads, rows)
 
 
-def causes_table(findings: Findings) -> PageTable | None:
+def _causes_table(findings: Findings) -> PageTable | None:
     """Return what may be wrong where the record contradicts the model; None if nothing was tried."""
     if "causes" not in findings.posterior.children:
         return None
@@ -144,10 +144,8 @@ def causes_table(findings: Findings) -> PageTable | None:
     if "misread" in causes.attrs:
         return None
     rows = [
-        [str(name), fixed(float(gain), ".0f"), "yes" if describes else "no", str(remedy)]
-        for name, gain, describes, remedy in zip(
-            *(causes[column].values for column in ("cause", "log_evidence", "describes", "remedy")), strict=True
-        )
+        [name, fixed(gain, ".0f"), "yes" if describes else "no", remedy]
+        for name, gain, describes, remedy in rows_of(causes, "cause", "log_evidence", "describes", "remedy")
     ]
     return PageTable("What may be wrong", ["cause", "log-evidence", "describes the record", "infer with"], rows)
 
@@ -156,8 +154,8 @@ def contacts_messages(findings: Findings) -> list[str]:
     """Return sentences on the statuses of single samples, and on the agreement of their four numbers with a rod."""
     contacts = findings.contacts
     if contacts is None:
-        words = channel_names(findings.record)
-        missing = [words[name] for name in CHANNELS if name not in present_channels(findings.record)]
+        present = present_channels(findings.record)
+        missing = [words for name, words in channel_names(findings.record).items() if name not in present]
         were = "was" if len(missing) == 1 else "were"
         return [f"Contact points take all three channels, and {' and '.join(missing)} {were} not measured."]
     fates = Counter(contacts["status"].values.tolist()).most_common()
@@ -175,17 +173,13 @@ def contacts_messages(findings: Findings) -> list[str]:
             f"{chance(probability)}{but}."
         )
     if np.isfinite(score):
+        agreement = "so that the force along the rod agrees with the moment"
+        if abs(score) > AXIAL_ALARM:
+            large = "too large: check the zero of the drive angle, the axes of the forces, and the rod"
+            agreement = "too small, as with friction" if score < 0.0 else large
         known = "inferred" if "friction" in read_json(findings.posterior.attrs["nuisances"], "nuisances") else "stated"
         said.append(
             "In tangential contact the force along the rod at the pivot follows from the moment, and from the friction "
-            f"that was {known}: the mean deviates by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."
+            f"that was {known}: the mean deviates by {fixed(score, '+.2f')} standard errors, {agreement}."
         )
     return said
-
-
-def _agreement(score: float) -> str:
-    if score < -AXIAL_ALARM:
-        return "too small, as with friction"
-    if score > AXIAL_ALARM:
-        return "too large: check the zero of the drive angle, the axes of the forces, and the rod"
-    return "so that the force along the rod agrees with the moment"

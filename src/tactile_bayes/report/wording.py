@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from tactile_bayes.plotting.labels import number, shown_unit
 
@@ -60,6 +61,11 @@ def spread(values: Iterable[float], width: float) -> list[str]:
     if decimals > 9 or decimals < -3:
         return [fixed(value, ".4g") for value in values]
     return [fixed(value, f".{max(0, decimals)}f") for value in values]
+
+
+def rows_of(found: xr.Dataset, *names: str) -> Iterator[tuple[Any, ...]]:
+    """Return the entries of variables or coordinates along their first dimension."""
+    return zip(*(found[name].values.tolist() for name in names), strict=True)
 
 
 def sentence(words: str) -> str:

@@ -91,7 +91,7 @@ def report_into(
     progress: Callable[[int, int], object] | None,
 ) -> WrittenPage:
     """Write the page of `write_report`, and return what a command says of it."""
-    given = [run] if isinstance(run, str | os.PathLike) or not isinstance(run, Sequence) else list(run)
+    given = list(run) if isinstance(run, Sequence) and not isinstance(run, str) else [run]
     folders = [check_path("run", each, "give the folder of a run, of several, or a list of them") for each in given]
     if not folders:
         raise ParameterError("there are no runs: give the folder of one")
@@ -114,7 +114,9 @@ def report_into(
     report = progress or (lambda done, count: None)
     if one is not None:
         findings = findings_of(one, compared, lambda done: report(done, count), other)
-        text = _rendered(page_of(findings, one.resolve().name))
+        page = page_of(findings, one.resolve().name)
+        page["data"] = Markup(_as_json(page["data"]))
+        text = rendered("template.html.jinja", _resource("report.js"), **page)
         if other is not None and findings.overlay is not None:
             draw_overlay(one.resolve().name, findings.band, findings.contacts, findings.overlay, figure)
             laid = Laid.over({one.resolve().name: findings.band}, findings.overlay)
@@ -128,26 +130,16 @@ def report_into(
     return WrittenPage(path, laid, figure if other is not None and one is not None else None)
 
 
-def _rendered(page: dict[str, Any]) -> str:
-    values = {name: value for name, value in page.items() if name != "data"}
-    return rendered("template.html.jinja", _resource("report.js"), data=Markup(_as_json(page["data"])), **values)
-
-
 def rendered(template: str, script: str = "", **values: Any) -> str:
     """Return a page from a template, with the style of the report and a policy that loads nothing."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
+    style, loader = _resource("report.css"), PackageLoader("tactile_bayes", "report")
     environment = Environment(
-        loader=PackageLoader("tactile_bayes", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    style = _resource("report.css")
-    return environment.get_template(template).render(
-        **values, style=Markup(style), script=Markup(script), policy=_policy(style, script)
-    )
+    values |= {"style": Markup(style), "script": Markup(script), "policy": _policy(style, script)}
+    return environment.get_template(template).render(values)
 
 
 def _resource(name: str) -> str:

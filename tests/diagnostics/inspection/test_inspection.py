@@ -1,6 +1,7 @@
 """The inspection of a record: nothing is said of a good one, and what is wrong is named."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan
@@ -22,8 +24,6 @@ COARSE = np.radians(12.0)
 OTHER_FORCE_X = 'force_x had the other sign (force_x = "-force_x" under [file] of rig.toml).'
 OTHER_MOMENT = 'holding_moment had the other sign (holding_moment = "-holding_moment" under [file] of rig.toml)'
 NOTHING = ("Nothing looks wrong.",)
-# Gain beside which the noise of loads is five times that of readings.
-FAINT = ((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))
 
 
 @pytest.fixture(scope="module")
@@ -97,19 +97,20 @@ def test_nothing_is_said_of_a_good_record(record):
     assert found.sweeps.unloaded.values.sum() == found.samples.unloaded.values.sum()
 
 
-@pytest.mark.parametrize(
-    "cell",
-    [
-        tb.LoadCell(force_noise=0.05, moment_noise=0.02),
-        tb.LoadCell(force_noise=0.2, moment_noise=0.08, bias=(0.3, 0.1, -0.4)),
-        tb.LoadCell(force_noise=0.05, moment_noise=0.02, force_resolution=0.05, moment_resolution=0.02),
-        tb.LoadCell(force_noise=0.02, moment_noise=0.01, force_resolution=0.1, moment_resolution=0.05),
-        tb.LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=3e-3, frame="turning"),
-        tb.LoadCell(force_noise=0.05, moment_noise=0.02, drift=tb.load_cell.RandomWalk(moment=2e-3, force=5e-3)),
-        tb.LoadCell(force_noise=0.05, moment_noise=0.02, gain=FAINT),
-    ],
-    ids=["usual", "poor", "steps", "coarse", "turning", "drift", "faint"],
-)
+USUAL = LoadCell(force_noise=0.05, moment_noise=0.02)
+CELLS = {
+    "usual": USUAL,
+    "poor": LoadCell(force_noise=0.2, moment_noise=0.08, bias=(0.3, 0.1, -0.4)),
+    "steps": replace(USUAL, force_resolution=0.05, moment_resolution=0.02),
+    "coarse": LoadCell(force_noise=0.02, moment_noise=0.01, force_resolution=0.1, moment_resolution=0.05),
+    "turning": replace(USUAL, drive_angle_noise=3e-3, frame="turning"),
+    "drift": replace(USUAL, drift=tb.load_cell.RandomWalk(moment=2e-3, force=5e-3)),
+    # Gain beside which the noise of loads is five times that of readings.
+    "faint": replace(USUAL, gain=((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))),
+}
+
+
+@pytest.mark.parametrize("cell", CELLS.values(), ids=CELLS)
 def test_nothing_is_said_of_good_records_of_any_cell_that_is_stated(swept, cell):
     """Seven tests at 1e-3 each, of 21 records: at most one false alarm in some 7 runs, at other seeds."""
     for seed, ideal in enumerate(swept):
@@ -130,11 +131,8 @@ def test_nothing_is_said_of_a_scan_nor_of_a_record_with_missing_channels(ideal, 
 def test_false_alarms_are_as_rare_as_stated():
     """Of 400 good records some 0.1 % to 1 % may be suspected; more than 8 has a probability below 0.03 at 1 %."""
     records = [tb.scan(tb.contours.paper_profile(name, q=0.5)).record for name in ("I", "II", "III", "IV")]
-    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-    suspected = sum(
-        tb.inspect_record(bare(cell.measure(records[seed % 4], rng=seed))).is_suspect for seed in range(400)
-    )
-    assert suspected <= 8
+    measured = (bare(USUAL.measure(records[seed % 4], rng=seed)) for seed in range(400))
+    assert sum(tb.inspect_record(record).is_suspect for record in measured) <= 8
 
 
 # --- What is wrong ----------------------------------------------------------------------------------------------------
@@ -288,7 +286,8 @@ def test_a_zero_that_moves_and_one_that_is_not_as_stated(ideal, record):
     moved = words(changed(record, force_y=record.force_y + 0.01 * later))
     assert moved[0].kind == "zero moved"
     assert moved[0].details["moved"].startswith("force_y (")
-    untared = changed(LOAD_CELL.measure(ideal, rng=1), force_y=LOAD_CELL.measure(ideal, rng=1).force_y + 0.015)
+    measured = LOAD_CELL.measure(ideal, rng=1)
+    untared = changed(measured, force_y=measured.force_y + 0.015)
     (sentence,) = words(untared)
     assert sentence.kind == "zero off"
     assert sentence.details["off"].startswith("force_y is off by 15.1 mN (")
@@ -304,12 +303,8 @@ def test_a_zero_farther_off_than_infer_expects_is_to_be_taken_off(record):
 
 def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
     """A file of a laboratory, with its own names, units, signs and zeros."""
-    columns = {
-        "drive_angle": "90-Motor[deg]",
-        "holding_moment": "Mz [N mm]",
-        "force_x": "Fx[mN]",
-        "force_y": "2-Fy[mN]",
-    }
+    sources = "90-Motor[deg]", "Mz [N mm]", "Fx[mN]", "2-Fy[mN]"
+    columns = dict(zip(("drive_angle", *CHANNELS), sources, strict=True))
     mm, mn = 1e3 * coarse.holding_moment.values, 1e3 * coarse.force_x.values
     fy = 2.0 - 1e3 * (coarse.force_y.values - 0.03)
     table = np.column_stack([90.0 - np.degrees(coarse.drive_angle.values), mm, mn, fy])
@@ -330,16 +325,12 @@ def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
 
 
 def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal, record):
-    cell = tb.LoadCell(
-        force_noise=1e-3, moment_noise=2.5e-4, drift=tb.load_cell.OrnsteinUhlenbeck(force=6e-3, time=5.0)
-    )
+    drift = tb.load_cell.OrnsteinUhlenbeck(force=6e-3, time=5.0)
+    cell = LoadCell(force_noise=1e-3, moment_noise=2.5e-4, drift=drift)
     measured = cell.measure(ideal, rng=1)
     assert words(measured) == NOTHING  # as it is stated
     assert "noise not white" in [sentence.kind for sentence in words(bare(measured))]
-    stated = bare(LOAD_CELL.measure(ideal, rng=1)).assign_attrs(
-        load_cell_force_noise=1e-3, load_cell_moment_noise=2.5e-4
-    )
-    first, *_ = words(stated)
+    first, *_ = words(record.assign_attrs(load_cell_force_noise=1e-3, load_cell_moment_noise=2.5e-4))
     assert first.kind == "noise not as stated"
     assert first.details == {"channel": "force_x", "found": "2.91 mN", "stated": "1 mN"}
     without_deviation = tb.LoadCell(force_noise=3e-3, moment_noise=2.5e-4, degrees_of_freedom=2.0)

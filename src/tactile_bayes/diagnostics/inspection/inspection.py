@@ -96,17 +96,15 @@ def inspect_record(
     false_alarm: float = 1e-3,
     progress: Callable[[int, int], object] | None = None,
 ) -> Inspection:
-    """Inspect a record before anything is inferred: its contents, and what looks wrong.
-
-    The inspection does not depend on a family of contours.
+    """Inspect a record before anything is inferred: its contents, and what looks wrong, whatever the contour.
 
     Parameters
     ----------
     record : xr.Dataset
         A record.
     rig : Rig, optional
-        Rod and load cell, by default those that the record states, bias and noise estimated from its unloaded samples
-        where nobody states a load cell; and known deviations, for which Step 2 corrects.
+        Rod and load cell, by default those that the record states, or bias and noise of its unloaded samples; and known
+        deviations, for which Step 2 corrects.
     false_alarm : float
         Level of every test, in (0, 0.5): the probability of a false alarm for a record in white normal noise with
         nothing wrong, for each sweep in `zero_load`, and for all channels and samples together in the others.
@@ -128,11 +126,10 @@ def inspect_record(
     Notes
     -----
     The messages report, in this order: a record without contact; channels that never change; loads that no such rod can
-    have; samples whose loads fit no contact, with the sign, the frame, the exchange of forces
-    or the friction that would correct them, if one does; readings cut off at the end of a range; a sweep without
-    contact; readings that are stuck or stored twice; outliers; a zero that moved, and one that differs from the data
-    sheet; noise that is not white, and noise that is not as stated; uneven steps of the drive; sweeps that begin or end
-    in contact.
+    have; samples whose loads fit no contact, with the sign, the frame, the exchange of forces or the friction that
+    would correct them, if one does; readings cut off at the end of a range; a sweep without contact; readings that are
+    stuck or stored twice; outliers; a zero that moved, or is off; noise that is not white, or not as stated; uneven
+    steps of the drive; sweeps that begin or end in contact.
 
     The inspection does not report a rod that is a few per cent stiffer or longer than stated, nor an encoder that is a
     degree off: `infer_contour` finds them. None of 1536 simulated records with eight kinds of load cell and nothing
@@ -224,8 +221,10 @@ def shown_rig(found: Inspection, rig: Rig) -> Rig:
     rig = replace(rig, file=replace(rig.format, columns={**rig.format.columns, **columns}))
     if found.load_cell_source != "unloaded samples":
         return rig
-    noises = {name: float(f"{getattr(found.load_cell, name):.{_DIGITS}g}") for name in ("force_noise", "moment_noise")}
-    return replace(rig, load_cell=replace(rig.load_cell or LoadCell(), **noises))
+    names = "force_noise", "moment_noise"
+    force_noise, moment_noise = (float(f"{getattr(found.load_cell, name):.{_DIGITS}g}") for name in names)
+    stated = rig.load_cell or LoadCell()
+    return replace(rig, load_cell=replace(stated, force_noise=force_noise, moment_noise=moment_noise))
 
 
 def _zeros(found: Inspection) -> Iterator[tuple[str, float]]:
