@@ -33,7 +33,6 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
 _UNKNOWNS = (*STANDARD, "base", "drift", "gain", *MEMORY, *COMPLIANCES, "rest_curvature", "taper", "stem", "length")
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
-
 _EDGES = ("lower", "median", "upper")
 
 

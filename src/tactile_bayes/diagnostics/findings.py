@@ -174,9 +174,8 @@ def listed(flags: Flags) -> str:
     where = np.flatnonzero(flags)
     runs = np.split(where, np.flatnonzero(np.diff(where) != 1) + 1)
     words = [f"{run[0]}" if run.size == 1 else f"{run[0]} to {run[-1]}" for run in runs]
-    more = len(words) - _SHOWN
-    shown = [*words[:_SHOWN], "..."] if more > 0 else words
-    return f"sample{'s' * (where.size != 1)} {joined(shown) if more <= 0 else ', '.join(shown)}"
+    shown = joined(words) if len(words) <= _SHOWN else ", ".join([*words[:_SHOWN], "..."])
+    return f"sample{'s' * (where.size != 1)} {shown}"
 
 
 def joined(words: Sequence[str]) -> str:

@@ -35,10 +35,8 @@ from tactile_bayes.uncertainty.budget import uncertainty_budget
 
 HOLDS, NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
 _NOISES = ("noise_scale", "moment_noise", "force_noise", *GROUPS["discrepancy"])
-
 CONTRADICTION = 1e-4  # probability of the misfit of single samples below which it is reported
 _FEWEST_PRIOR_DRAWS = 500
-
 # Distance of the posterior median beyond the prior's last draw from which it is reported, over the distance from the 5
 # % quantile of the prior's draws to the last: some four standard deviations of a normal prior; a prior that is largest
 # at its end has nothing beyond it.

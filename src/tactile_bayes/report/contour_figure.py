@@ -20,7 +20,6 @@ from tactile_bayes.report.wording import Shown, percent, shown_as, spread
 from tactile_bayes.uncertainty.overlay import Overlay
 
 _DETAIL_HEIGHT = 230.0
-
 _TABLED = 21
 
 # Half widths of the band to which an overlay extends the enlarged drawing, which it may leave.

@@ -63,8 +63,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Frames:
     angle = (read - likelihood.misread(rig)[0])[samples]
     angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(batch_index, likelihood.travels(read, rig)[0, samples])
-    found = {name: float(draw[name]) for name in unknowns.names}
-    rod = rod_with(rod_of(record), {**unknowns.known, **found})
+    rod = rod_with(rod_of(record), {**unknowns.known, **{name: float(draw[name]) for name in unknowns.names}})
     stiffer = float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
     in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, units)
@@ -74,10 +73,9 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Frames:
     sign = np.where(mirrored, -1.0, 1.0)
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
-    base_x, base_y = (record[name].values[samples] for name in ("base_x", "base_y"))
-    first = likelihood.segments.bases[batch_index]
-    base_x = paths.sweep_frame.base_x[batch_index] + base_x - first[:, 0]
-    base_y = paths.sweep_frame.base_y[batch_index] + base_y - first[:, 1]
+    starts = np.stack([paths.sweep_frame.base_x, paths.sweep_frame.base_y], axis=-1)
+    bases = np.stack([record["base_x"].values, record["base_y"].values], axis=-1)[samples]
+    base_x, base_y = (starts[batch_index] + bases - likelihood.segments.bases[batch_index]).T
     return Frames(
         contour=contour.take(np.array(0)),
         samples=samples,
@@ -90,6 +88,6 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Frames:
         drive_angle=np.where(mirrored, np.pi - slope, slope),
         cell_angle=angle,
         loads=np.where(loaded[:, None], loads, 0.0),
-        pivots=np.unique(np.stack([paths.sweep_frame.base_x, paths.sweep_frame.base_y], axis=-1), axis=0),
+        pivots=np.unique(starts, axis=0),
         every=every,
     )

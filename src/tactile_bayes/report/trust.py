@@ -18,6 +18,7 @@ from tactile_bayes.report.readings_figure import channel_names
 from tactile_bayes.report.wording import PageTable, chance, fixed, percent, rows_of, sentence, shown_as
 from tactile_bayes.tasks.documents import read_json
 
+_COVERAGE = ("coverage", "coverage_error", "coverage_replicates")
 _WIDTH = "width of the band"  # kind of a finding that is none against the result
 
 
@@ -69,9 +70,7 @@ def _trust_tables(found: xr.Dataset) -> list[PageTable]:
     if "claim" in found.dims:
         claims = [
             [CLAIMS[name], f"{percent(round(share, 3))} ± {percent(round(error, 3))}", str(int(count))]
-            for name, share, error, count in rows_of(
-                found, "claim", "coverage", "coverage_error", "coverage_replicates"
-            )
+            for name, share, error, count in rows_of(found, "claim", *_COVERAGE)
         ]
         stated = f"stated with {percent(float(found.attrs['probability']))}"
         tables.append(PageTable("Records like this one, simulated and inferred", [stated, "holds in", "of"], claims))

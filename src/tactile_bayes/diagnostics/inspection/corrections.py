@@ -19,7 +19,6 @@ Transform = Callable[[xr.Dataset], xr.Dataset]
 # Beginning of the texts of corrections that change the drive angle, and with it perhaps the directions.
 OTHER_ANGLE = "the drive angle were counted otherwise"
 _FRICTIONS = (0.1, 0.2, 0.3, 0.5)
-
 _FRAME_TEXTS = {
     "turning": f"the load cell turned with the drive ({rig_entry('frame', 'turning', 'load_cell')})",
     "fixed": f"the load cell did not turn with the drive ({rig_entry('frame', 'fixed', 'load_cell')})",

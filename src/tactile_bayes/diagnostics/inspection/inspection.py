@@ -33,7 +33,6 @@ from tactile_bayes.rig.rig import Rig, rig_of
 _STEPS = 3
 _MOVED = 1e-3  # probability that a zero which stays where it is seems to have moved as far between unloaded stretches
 _DIGITS = 3  # number of significant digits of a noise that is estimated
-
 _STATED = ("given", "data sheet")  # sources of a load cell that somebody states
 
 CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"]

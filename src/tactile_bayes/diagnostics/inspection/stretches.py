@@ -43,18 +43,14 @@ def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
     _, spread = centred(reading, stretches)
     if spread == 0.0:
         return Autocorrelation(np.nan, np.nan)
-    product, square, pairs, expected = 0.0, 0.0, 0, 0.0
-    for rows in stretches:
-        if rows.size < 3:
-            continue
-        residual = np.clip(reading[rows] - np.median(reading[rows]), -_CUT * spread, _CUT * spread)
-        residual = residual - residual.mean()
-        product += float(residual[1:] @ residual[:-1])
-        square += float(residual @ residual)
-        pairs += rows.size - 1
-        expected -= (rows.size - 1) / rows.size
+    cut = [reading[rows] - np.median(reading[rows]) for rows in stretches if rows.size > 2]
+    cut = [np.clip(residual, -_CUT * spread, _CUT * spread) for residual in cut]
+    residuals = [residual - residual.mean() for residual in cut]
+    pairs, square = sum(r.size - 1 for r in residuals), float(sum(r @ r for r in residuals))
     if pairs < 10 or square <= 0.0:
         return Autocorrelation(np.nan, np.nan)
+    product = float(sum(r[1:] @ r[:-1] for r in residuals))
+    expected = -sum((r.size - 1) / r.size for r in residuals)
     variance = square / pairs  # a stretch of n has n − 1 degrees of freedom, as many as pairs
     value = (product / variance - expected) / pairs
     return Autocorrelation(float(np.clip(value, -1.0, 1.0)), float(value * np.sqrt(pairs)))
