@@ -102,7 +102,7 @@ def watch(
         particles=particles,
         rig=stated.without_bare_cell,
     ) as watched:
-        follower = _Follower(record, growing, watched, stated.format.split_sweeps, output, poll, idle)
+        follower = _Follower(record, growing, watched, stated.format.split_sweeps is True, output, poll, idle)
         try:
             with acknowledge_interrupt(_STOPPING):
                 reason = follower.follow()
