@@ -17,10 +17,11 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
-    as_numbers,
+    TINY,
     check_function,
     check_names,
     check_number,
+    check_numbers,
     check_optional,
     check_path,
     check_whole_number,
@@ -31,13 +32,13 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.plotting.axes import AxesArray
+from tactile_bayes.plotting.drive_axis import EVENT_MARKERS, draw_events, phase_runs, with_events
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_in_rows
 from tactile_bayes.plotting.maps import draw_object, draw_pivot, label_map, outline
 from tactile_bayes.plotting.marks import BASES, PALETTE, PHASES, SWEEP_MARKERS
-from tactile_bayes.plotting.rod_map import rods as draw_rods
+from tactile_bayes.plotting.scan_maps import rods as draw_rods
 from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH, Style, own_style, save_figure
-from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, draw_events, phase_runs, with_events
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.rig import Rig
@@ -121,22 +122,9 @@ def figure(
 
 
 def caption(number: int, **options: Any) -> str:
-    """Return the caption of a figure.
+    """Return the caption of a figure, with the sweep, the distances and the seed of the noise.
 
-    Parameters
-    ----------
-    number, options
-        As in `figure`.
-
-    Returns
-    -------
-    str
-        The caption, with the sweep, the distances and the seed of the noise.
-
-    Raises
-    ------
-    ParameterError
-        As `figure`.
+    Arguments and errors are those of `figure`.
 
     Examples
     --------
@@ -162,7 +150,7 @@ def draw_all(
     progress: Callable[[int], object] | None = None,
     **options: Any,
 ) -> dict[int, dict[str, Path]]:
-    """Write figures of the paper to a folder, and return their files.
+    """Write figures of the paper to a folder, and return their files by number and format.
 
     Files are named figure_02.pdf and so on, and hold their caption. They are written whole: after an interrupt each
     file is the old or the new one, and the same call makes all of them anew. The same options give the same bytes.
@@ -182,11 +170,6 @@ def draw_all(
     **options
         Options of `figure`.
 
-    Returns
-    -------
-    dict of int to dict of str to Path
-        Files by number and format.
-
     Raises
     ------
     ParameterError, ContourError
@@ -196,8 +179,7 @@ def draw_all(
     --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     files = draw_all(folder, only=[3], formats=["svg"], distances=[0.5])
-    ...     files[3]["svg"].name
+    ...     draw_all(folder, only=[3], formats=["svg"], distances=[0.5])[3]["svg"].name
     'figure_03.svg'
     """
     wanted = list(dict.fromkeys(check_names("formats", formats)))
@@ -277,21 +259,15 @@ class _Choice:
 
 
 def _chosen(
-    number: int,
-    distances: Sequence[float] | None,
-    drive_step: float | None,
-    rods: int,
-    load_cell: LoadCell | None,
-    rng: Rng | None,
-    width: float,
+    number: int, distances: Any, drive_step: float | None, rods: int, load_cell: LoadCell | None, rng: Any, width: float
 ) -> tuple[_Entry, _Choice]:
     """Return an entry of the catalogue, and the checked options."""
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or number not in _ENTRIES:
         raise ParameterError(f"there is no figure {number!r}: choose from {NUMBERS[0]} to {NUMBERS[-1]}")
     entry = _ENTRIES[number]
-    q = as_numbers(entry.distances if distances is None else distances)
-    if q is None or q.ndim != 1 or not q.size or not np.all(np.isfinite(q) & (q > 0.0)):
-        raise ParameterError(f"distances are {distances!r}: give rod lengths above 0, like [0.3, 0.5]")
+    given = entry.distances if distances is None else distances
+    correction = "give rod lengths above 0, like [0.3, 0.5]"
+    q = check_numbers("distances", given, correction, shape=(None,), least=TINY)
     rods = check_whole_number("rods", rods, 1, "give a whole number from 1 up, like 15")
     inches = f"give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}"
     width = check_number("width", width, inches, least=3.0, most=12.0)
@@ -311,27 +287,14 @@ _BESIDE = {"tip": 0.2, "tangential": 0.36}  # radius at which the slope angle is
 _ARROW = 0.2  # length of the contact force; components of the reaction are in proportion to it [L]
 _CLEAR: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 _THIN: dict[str, Any] = {"color": "0.35", "linewidth": 0.7}
-_HEAD: dict[str, Any] = {
-    "arrowstyle": "-|>",
-    "color": PALETTE["change"],
-    "linewidth": 1.2,
-    "mutation_scale": 9.0,
-    "shrinkA": 0.0,
-    "shrinkB": 0.0,
-}
+_HEAD: dict[str, Any] = {"arrowstyle": "-|>", "color": PALETTE["change"], "linewidth": 1.2, "mutation_scale": 9.0}
+_HEAD |= {"shrinkA": 0.0, "shrinkB": 0.0}
 
 
 def _draw_contact_kinds(profile: Profile, choice: _Choice) -> Figure:
     """Draw a panel for each kind of contact: angles, contact point, and the forces on the rod and its support."""
-    from matplotlib.figure import Figure
-
-    columns = 1 if choice.is_column else 2
-    rows = 2 // columns
-    high = 0.92 * choice.width / columns * np.ptp(_LIMITS[1]) / np.ptp(_LIMITS[0]) + 0.35
-    figure = Figure(figsize=(choice.width, rows * high), layout="compressed")
-    options: dict[str, Any] = {"xlim": _LIMITS[0], "ylim": _LIMITS[1], "aspect": "equal"}
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, subplot_kw=options).ravel()
-    for letter, ax, phase in zip("ab", panels, PHASES, strict=True):
+    figure, panels = choice.map_panels(2, _LIMITS, beside=0.28, between=0.35, above=0.0)
+    for letter, ax, phase in zip("ab", panels.ravel(), PHASES, strict=True):
         distance, made, state = _state(profile, phase, choice)
         _draw_state(ax, made, state, phase)
         ax.set_title(f"({letter}) {PHASES[phase]}, $q$ = {distance:g} $L$")
@@ -508,10 +471,9 @@ def _draw_deformed_rods(profile: Profile, choice: _Choice) -> Figure:
         found |= legend_entries(ax)
         ax.get_legend().remove()
         ax.set_title(f"{made.sweeps[number].direction}, $q$ = {distance:g} $L$")
-    for place, ax in enumerate(grid.ravel()):
-        if place >= len(sweeps):
-            ax.remove()
-            continue
+    for ax in grid.ravel()[len(sweeps) :]:
+        ax.remove()
+    for place, ax in enumerate(grid.ravel()[: len(sweeps)]):
         is_lowest, is_first = place + columns >= len(sweeps), place % columns == 0
         ax.tick_params(labelbottom=is_lowest, labelleft=is_first)
         if not is_lowest:
@@ -557,10 +519,8 @@ def _draw_reconstructed_points(choice: _Choice) -> Figure:
             _draw_points(ax, choice.scan(profile, distance), distance, choice)
         draw_pivot(ax, (0.0, 0.0))
         ax.set_title(f"profile {profile}")
-    for ax in grid[-1]:
-        set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", {}, np.zeros(1))
-    for ax in grid[:, 0]:
-        set_unit(ax.yaxis, LABELS["contact_y"] + " ", "contact_y", {}, np.zeros(1))
+        label_map(ax, {}, np.zeros(1))
+        ax.label_outer()
     sweeps, rest = [f"{direction} sweep" for direction in _COLOURS], ["contour", "gap", "pivot"]
     groups = [sweeps, rest] if choice.is_column else [[*sweeps, *rest]]
     legend_in_rows(figure, legend_entries(*grid.flat), groups, 3 if choice.is_column else 5)

@@ -13,6 +13,5 @@ def pytest_generate_tests(metafunc):
     if "fuzz_seed" in metafunc.fixturenames:
         day = datetime.date.today().toordinal() * BY_DAY
         metafunc.parametrize(
-            "fuzz_seed",
-            [*FIXED, *(pytest.param(day + number, marks=pytest.mark.slow) for number in range(BY_DAY))],
+            "fuzz_seed", [*FIXED, *(pytest.param(day + number, marks=pytest.mark.slow) for number in range(BY_DAY))]
         )

@@ -62,12 +62,7 @@ class Held(NamedTuple):
 
 
 def held(
-    contour,
-    state,
-    radius: float | None = None,
-    *,
-    curvature: Along = np.zeros_like,
-    rigidity: Along = np.ones_like,
+    contour, state, radius: float | None = None, *, curvature: Along = np.zeros_like, rigidity: Along = np.ones_like
 ) -> Held:
     """One state, a row of `equilibria` of a forward sweep; the radius is the contour's own if not given."""
     alpha = float(state.slope_angle)

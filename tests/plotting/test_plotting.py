@@ -17,7 +17,7 @@ from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.plotting import posteriors, touch_map
+from tactile_bayes.plotting import posteriors, scan_maps
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels
 from tactile_bayes.record import CHANNELS, in_frame, turned
@@ -501,7 +501,7 @@ def test_a_sweep_that_touches_an_edge_only_is_a_point():
 )
 @pytest.mark.parametrize("size", [1.0, 0.05])
 def test_gaps_are_between_all_arcs(ends, gaps, size):
-    found = touch_map._gaps([(size * np.array(end), np.zeros(2)) for end in ends], same=1e-7 * size)
+    found = scan_maps._gaps([(size * np.array(end), np.zeros(2)) for end in ends], same=1e-7 * size)
     np.testing.assert_allclose(np.reshape(found, (-1, 2)), size * np.reshape(gaps, (-1, 2)), rtol=1e-15)
 
 

@@ -6,25 +6,21 @@ its settings do not change, and no figure is shown. `style` is a context manager
 or for the screen.
 """
 
-from tactile_bayes.plotting.assumption_dots import assumptions
+from tactile_bayes.plotting.alternatives import assumptions, families
 from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverage
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
-from tactile_bayes.plotting.contour_map import band_detail, contour, gap
+from tactile_bayes.plotting.contour_map import band_detail, contour, gap, overlaid
 from tactile_bayes.plotting.design_map import design
-from tactile_bayes.plotting.error_lines import error_map
-from tactile_bayes.plotting.family_bars import families
 from tactile_bayes.plotting.inspection_panels import inspection
 from tactile_bayes.plotting.marks import PALETTE
-from tactile_bayes.plotting.overlaid import overlaid
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.reach_map import posterior_contours, prior_contours
 from tactile_bayes.plotting.records import observables, predictive
-from tactile_bayes.plotting.requirements import required_noise, required_rod
-from tactile_bayes.plotting.rod_map import rods
+from tactile_bayes.plotting.requirements import error_map, required_noise, required_rod
+from tactile_bayes.plotting.scan_maps import rods, touched
 from tactile_bayes.plotting.style import style
 from tactile_bayes.plotting.sweep_plans import amplification, information, noise_shares
 from tactile_bayes.plotting.tightening import tightening
-from tactile_bayes.plotting.touch_map import touched
 
 __all__ = [
     "PALETTE",

@@ -18,8 +18,6 @@ from tactile_bayes.plotting.marks import PALETTE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MOST_SAMPLES = 10**9
-
 AxesArray = NDArray[np.object_]
 
 
@@ -47,8 +45,8 @@ def new_panels(rows: int, columns: int, height: float, width: float = 7.0, **opt
     """Return Axes of a new figure, shape (rows, columns); options are those of `pyplot.subplots`."""
     from matplotlib import pyplot as plt
 
-    size = (width, height)
-    return plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)[1]
+    options |= {"figsize": (width, height), "layout": "constrained", "squeeze": False}
+    return plt.subplots(rows, columns, **options)[1]
 
 
 def check_drawing(ax: Any = None, truth: Any = None) -> None:
@@ -65,7 +63,7 @@ def checked_samples(samples: Any) -> NDArray[np.intp] | None:
     if samples is None:
         return None
     correction = "give a list of numbers of samples, or None"
-    numbers = np.atleast_1d(check_numbers("samples", samples, correction, least=0, most=_MOST_SAMPLES))
+    numbers = np.atleast_1d(check_numbers("samples", samples, correction, least=0, most=10**9))
     if numbers.ndim != 1 or np.any(numbers != np.round(numbers)):
         raise refused("samples", samples, correction)
     return numbers.astype(np.intp)
@@ -79,18 +77,17 @@ def check_panels(axes: Any, shape: tuple[int, ...], meaning: str, *, lower: bool
     from matplotlib.axes import Axes
 
     panels = np.atleast_1d(np.array(None if hasattr(axes, "data_vars") else axes, dtype=object))
-    wanted = panels[np.tril_indices(len(panels))] if lower and panels.shape == shape else panels.ravel()
-    if panels.shape == shape and not all(isinstance(ax, Axes) for ax in wanted):
-        raise refused("axes", axes, f"give an array of Axes of Matplotlib, shape {shape}: {meaning}")
     if panels.shape != shape:
         raise ParameterError(f"axes have shape {panels.shape}, and {shape} is wanted: {meaning}")
+    wanted = panels[np.tril_indices(len(panels))] if lower else panels.ravel()
+    if not all(isinstance(ax, Axes) for ax in wanted):
+        raise refused("axes", axes, f"give an array of Axes of Matplotlib, shape {shape}: {meaning}")
     return panels
 
 
 def check_dataset(found: Any, names: set[str], kind: str, source: str, attrs: Sequence[str] = ()) -> None:
     """Refuse objects other than a dataset with these variables and attributes; `source` names the function for it."""
-    is_one = isinstance(found, xr.Dataset) and names <= set(found.variables) and set(attrs) <= set(found.attrs)
-    if not is_one:
+    if not (isinstance(found, xr.Dataset) and names <= set(found.variables) and set(attrs) <= set(found.attrs)):
         raise ParameterError(f"this is no {kind}: give what {source} returned")
 
 

@@ -44,7 +44,7 @@ class _Ranks(NamedTuple):
     excess: Floats
     low: Floats
     high: Floats
-    word: str
+    word: str = ""
 
 
 def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray:
@@ -66,10 +66,6 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
     axes : array_like of Axes, shape (quantities,), optional
         One for each quantity, in their order.
 
-    Returns
-    -------
-    ndarray of Axes, shape (quantities,)
-
     Raises
     ------
     ParameterError
@@ -77,16 +73,9 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
 
     Examples
     --------
-    >>> rng = np.random.default_rng(1)
-    >>> found = xr.Dataset(
-    ...     {
-    ...         "ranks": (("replicate", "quantity"), rng.integers(0, 100, (50, 2))),
-    ...         "rank_p_value": ("quantity", [0.4, 0.8]),
-    ...     },
-    ...     coords={"quantity": ["a", "q"]},
-    ...     attrs={"level": 0.001},
-    ... )
-    >>> [ax.get_title() for ax in calibration_ranks(found)]
+    >>> ranks = np.random.default_rng(1).integers(0, 100, (50, 2))
+    >>> found = xr.Dataset({"ranks": (("replicate", "quantity"), ranks), "rank_p_value": ("quantity", [0.4, 0.8])})
+    >>> [ax.get_title() for ax in calibration_ranks(found.assign_coords(quantity=["a", "q"]).assign_attrs(level=0.001))]
     ['a', 'q']
     """
     check_dataset(calibration, {"ranks", "rank_p_value", "quantity"}, "calibration", "calibrate", ["level"])
@@ -94,7 +83,8 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
         raise ParameterError(
             f"none of {calibration.sizes['replicate']} replicates has a posterior: see message, which says why"
         )
-    drawn = _ranks(calibration)
+    ranks = calibration["ranks"].transpose("quantity", "replicate").values
+    drawn = [_ranks(of_one, calibration.isel(quantity=k)) for k, of_one in enumerate(ranks)]
     panels = _new_panels(calibration, drawn) if axes is None else _panels_given(axes, len(drawn))
     limit = _ROOM * max(float(np.max(np.abs([each.excess, each.low, each.high]))) for each in drawn)
     usual = max(each.replicates for each in drawn)
@@ -112,18 +102,14 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw the coverage of each claim: the share of replicates in which it holds, and its standard error.
 
     A dot is the share, its bar reaches two standard errors to either side, within 0 and 1; the vertical line is the
-    stated probability. The share and the number of replicates are written at the right.
+    stated probability. The share and the number of replicates are written at the right. Claims judged in fewer than 2
+    replicates are left out, and named below.
 
     Parameters
     ----------
     calibration : xr.Dataset
         From `tactile_bayes.calibrate`.
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
-        Claims judged in fewer than 2 replicates are left out, and named below.
 
     Raises
     ------
@@ -132,40 +118,29 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> found = xr.Dataset(
-    ...     {
-    ...         "coverage": ("claim", [0.89, 0.93]),
-    ...         "coverage_error": ("claim", [0.02, 0.018]),
-    ...         "coverage_replicates": ("claim", [200, 198]),
-    ...     },
-    ...     coords={"claim": ["pointwise_in_gap", "snap_off"]},
-    ...     attrs={"probability": 0.9},
-    ... )
-    >>> [label.get_text() for label in coverage(found).get_yticklabels()]
+    >>> shares = {"coverage": [0.89, 0.93], "coverage_error": [0.02, 0.018], "coverage_replicates": [200, 198]}
+    >>> found = xr.Dataset({name: ("claim", values) for name, values in shares.items()}, attrs={"probability": 0.9})
+    >>> ax = coverage(found.assign_coords(claim=["pointwise_in_gap", "snap_off"]))
+    >>> [label.get_text() for label in ax.get_yticklabels()]
     ['band, in the gap', 'angle of snap-off']
     """
     from tactile_bayes.calibration.summary import CLAIMS
 
     names = {"coverage", "coverage_error", "coverage_replicates", "claim"}
     check_dataset(calibration, names, "calibration", "calibrate", ["probability"])
-    is_enough = calibration["coverage_replicates"].values >= _FEWEST
-    is_shown = is_enough & np.isfinite(calibration["coverage"].values)
-    shown = calibration.isel(claim=is_shown)
-    labels, left_out = (
-        [CLAIMS.get(str(name), str(name)) for name in calibration["claim"].values[chosen]]
-        for chosen in (is_shown, ~is_shown)
-    )
+    is_shown = (calibration["coverage_replicates"].values >= _FEWEST) & np.isfinite(calibration["coverage"].values)
+    words = np.array([CLAIMS.get(str(name), str(name)) for name in calibration["claim"].values], dtype=object)
+    labels, left_out = words[is_shown].tolist(), words[~is_shown].tolist()
     ax = axes_for(ax, height=1.4 + 0.36 * max(len(labels), 2))
     if not labels:
         return write_instead(ax, f"no claim was judged in {_FEWEST} replicates or more")
     probability = float(calibration.attrs["probability"])
     label_rows(ax, labels, above=0.6, below=0.9)
-    _draw_shares(ax, shown, probability)
+    _draw_shares(ax, calibration.isel(claim=is_shown), probability)
     ax.locator_params(axis="x", nbins=7, steps=[1, 2, 5, 10])
     ax.xaxis.set_major_formatter(lambda share, _: percent(share))
     ax.set_xlabel("share in which it holds ± 2 standard errors")
-    title = f"Coverage of statements with {percent(probability)} probability"
-    ax.set_title(title, loc="left", fontsize="medium")
+    ax.set_title(f"Coverage of statements with {percent(probability)} probability", loc="left", fontsize="medium")
     if left_out:
         words = f"left out, with fewer than {_FEWEST} replicates: {'; '.join(left_out)}"
         wrapped = textwrap.fill(words, max(20, int(_LETTERS_PER_INCH * ax.figure.bbox.width / ax.figure.dpi)))
@@ -206,37 +181,25 @@ def _across() -> str:
     return f"rank of the truth / {DRAWS}"
 
 
-def _ranks(calibration: xr.Dataset) -> list[_Ranks]:
+def _ranks(ranks: Any, quantity: xr.Dataset) -> _Ranks:
+    from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band  # loads the sampler
     from tactile_bayes.calibration.replicate import DRAWS
 
-    p_values = calibration["rank_p_value"].values.astype(float)
-    level = float(calibration.attrs["level"])
-    by_quantity = calibration["ranks"].transpose("quantity", "replicate").values
-    return [
-        _ranks_of(str(name), ranks[ranks >= 0], DRAWS, float(p_value), level)
-        for name, ranks, p_value in zip(calibration["quantity"].values, by_quantity, p_values, strict=True)
-    ]
-
-
-def _ranks_of(name: str, ranks: Any, top: int, p_value: float, level: float) -> _Ranks:
-    nothing = np.zeros(top + 1)
+    name, p_value = str(quantity["quantity"].values), float(quantity["rank_p_value"])
+    ranks = ranks[ranks >= 0]
     if not ranks.size:
-        return _Ranks(name, 0, p_value, nothing, nothing, nothing, "")
-    shares = np.cumsum(np.bincount(ranks, minlength=top + 1))[:top] / ranks.size
-    from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band  # loads the sampler
-
-    low, high = simultaneous_band(ranks.size, top, _BAND)
-    leaves = bool(np.any((shares < low) | (shares > high)))
+        return _Ranks(name, 0, p_value, *np.zeros((3, DRAWS + 1)))
+    shares = np.cumsum(np.bincount(ranks, minlength=DRAWS + 1))[:DRAWS] / ranks.size
+    low, high = simultaneous_band(ranks.size, DRAWS, _BAND)
+    word = "leaves the band" if np.any((shares < low) | (shares > high)) else ""
     # At the last rank both distribution functions are 1.
-    excess, low, high = (np.append(each - expected_shares(top), 0.0) for each in (shares, low, high))
-    word = "not uniform" if p_value <= level else "leaves the band" if leaves else ""
-    return _Ranks(name, int(ranks.size), p_value, excess, low, high, word)
+    curves = (np.append(each - expected_shares(DRAWS), 0.0) for each in (shares, low, high))
+    return _Ranks(name, ranks.size, p_value, *curves, "not uniform" if p_value <= quantity.attrs["level"] else word)
 
 
 def _draw_ranks(ax: Axes, drawn: _Ranks, usual: int) -> None:
     colour = _COLOURS[drawn.word]
-    is_marked = bool(drawn.word)
-    ax.set_title(drawn.name, fontsize="small", fontweight="bold" if is_marked else "normal", pad=3.0)
+    ax.set_title(drawn.name, fontsize="small", fontweight="bold" if drawn.word else "normal", pad=3.0)
     words: dict[str, Any] = {"fontsize": "small", "transform": ax.transAxes, "ha": "center"}
     if not drawn.replicates:
         ax.text(0.5, 0.5, "no ranks", va="center", **words)
@@ -245,26 +208,21 @@ def _draw_ranks(ax: Axes, drawn: _Ranks, usual: int) -> None:
     style: dict[str, Any] = {"step": "post", "color": PALETTE["band"], "alpha": 0.6, "linewidth": 0.0}
     ax.fill_between(at, drawn.low, drawn.high, **style)
     ax.axhline(0.0, color="0.45", linewidth=0.7, zorder=1.5)
-    ax.step(at, drawn.excess, where="post", color=colour, linewidth=1.8 if is_marked else 1.1, zorder=2.5)
+    ax.step(at, drawn.excess, where="post", color=colour, linewidth=1.8 if drawn.word else 1.1, zorder=2.5)
     if drawn.word == "not uniform":
         ax.spines[:].set(color=colour, linewidth=1.6)
-    if is_marked:
+    if drawn.word:
         ax.text(0.5, 0.97, drawn.word, va="top", fontweight="bold", **words)
     of = f" (of {drawn.replicates})" if drawn.replicates != usual else ""
-    ax.text(0.5, 0.03, _p_value_in_words(drawn.p_value) + of, va="bottom", **words)
-
-
-def _p_value_in_words(p_value: float) -> str:
-    if np.isnan(p_value):
-        return "too few to test"
-    return "p < 0.001" if p_value < 1e-3 else f"p = {number(p_value, digits=2)}"
+    tested = "p < 0.001" if drawn.p_value < 1e-3 else f"p = {number(drawn.p_value, digits=2)}"
+    ax.text(0.5, 0.03, ("too few to test" if np.isnan(drawn.p_value) else tested) + of, va="bottom", **words)
 
 
 def _heading(calibration: xr.Dataset, drawn: list[_Ranks]) -> str:
     with_ranks, count = int((calibration["ranks"] >= 0).any("quantity").sum()), calibration.sizes["replicate"]
     replicates = f"{count} replicates" if with_ranks == count else f"{with_ranks} of {count} replicates"
     wrong = [each.name for each in drawn if each.word == "not uniform"]
-    tested = sum(1 for each in drawn if np.isfinite(each.p_value))
+    tested = np.count_nonzero(np.isfinite([each.p_value for each in drawn]))
     if wrong:
         words = f"Not uniform, over {replicates}: ranks of {', '.join(wrong)}"
     elif tested:

@@ -12,6 +12,7 @@ from scipy.special import chdtri
 from tactile_bayes.arrays import Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.plotting.axes import axes_for, checked_samples
 from tactile_bayes.plotting.labels import percent
 from tactile_bayes.plotting.legends import legend_entry
@@ -50,10 +51,6 @@ def contact_ellipses(
     truth : Contour, optional
         The true contour, in the units of the contacts.
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------
@@ -108,10 +105,6 @@ def contact_regions(
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------
@@ -179,11 +172,8 @@ def radius_of(probability: float) -> float:
 
 def _spread(has: Any, is_candidate: Any, samples: Index | None) -> list[int]:
     """Return the requested samples, or a dozen of the candidates, without those that have no contact."""
-    chosen = np.flatnonzero(is_candidate)
-    if samples is not None:
-        chosen = samples
-    elif chosen.size > _DRAWN:
-        chosen = chosen[np.linspace(0, chosen.size - 1, _DRAWN).astype(int)]
+    candidates = np.flatnonzero(is_candidate)
+    chosen = candidates[evenly_spread(candidates.size, _DRAWN)] if samples is None else samples
     return [int(i) for i in chosen[has[chosen]]]
 
 

@@ -1,8 +1,9 @@
-"""Figures of an inferred contour: a map, its band in detail, and its gap enlarged."""
+"""Figures of inferred contours: a map, bands in detail or over each other, and the gap enlarged."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,36 +11,28 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_array, check_numbers
+from tactile_bayes.checks import check_array, check_mapping, check_numbers, check_optional, check_switch
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import axes_for, check_dataset, write_instead
 from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
 from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, outline
-from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES, TRUTH
+from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from tactile_bayes.contours.base import Contour
+    from tactile_bayes.uncertainty.overlay import Overlay
 
 _SHAPE: dict[str, Any] = {"color": "#5FA5D2", "linewidth": 0.0}  # the band of the shape alone
 _MARGIN = 0.12  # margin beside the gap, as a share of its width
 _ROOM = 0.12  # margin above and below the curves, as a share of their height
-_ENDS: dict[str, Any] = {
-    "color": "black",
-    "marker": "o",
-    "markersize": 5.0,
-    "markerfacecolor": "white",
-    "markeredgewidth": 1.1,
-    "linestyle": "none",
-    "linewidth": 1.1,
-    "capsize": 2.5,
-    "zorder": 4,
-}
-
-
-_BAND = "band", "contour_band"
+_ENDS: dict[str, Any] = {"color": "black", "marker": "o", "markersize": 5.0, "markerfacecolor": "white", "zorder": 4}
+_ENDS |= {"markeredgewidth": 1.1, "linestyle": "none", "linewidth": 1.1, "capsize": 2.5}
+_CONTACTS: dict[str, Any] = {"marker": "o", "markersize": 2.2, "markeredgewidth": 0.0, "linestyle": "none"}
+_CONTACTS |= {"alpha": 0.6, "zorder": 3}
+_EDGES = {"x", "lower", "median", "upper"}
 _GAP = {"left", "right", "bound"}
 
 
@@ -58,12 +51,12 @@ def contour(
     Parameters
     ----------
     x : array_like, shape (n,)
-        The range drawn, from the smallest to the largest value, in the record's unit of length.
+        Numbers that span the range drawn, in the record's unit of length.
     truth : Contour, optional
         The true contour.
     contacts : xr.Dataset, optional
-        Over "sample": contact_x, contact_y; if present, contact_phase colours the points, and only those with status
-        "ok" are drawn.
+        Over "sample": contact_x and contact_y; contact_phase colours the points, and of those with a status only "ok"
+        is drawn.
     band : xr.Dataset, optional
         Over coordinate "x": lower, upper and median, with the probability of the band as attribute.
     gap : (float, float) or xr.Dataset, optional
@@ -72,10 +65,6 @@ def contour(
     base : (float, float), optional
         The pivot, in the record's unit of length.
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------
@@ -89,7 +78,7 @@ def contour(
     '$y$ [$L$]'
     """
     if band is not None:
-        check_dataset(band, {"x", "lower", "upper"}, *_BAND)
+        check_dataset(band, {"x", "lower", "upper"}, "band", "contour_band")
     if contacts is not None:
         check_dataset(contacts, {"contact_x", "contact_y"}, "dataset of contact points", "reconstruct")
     if base is not None:
@@ -106,14 +95,14 @@ def contour(
     attrs: Mapping[Any, Any] = {}
     if band is not None:
         attrs = band["lower"].attrs or band["x"].attrs
-        slack = 1e-9 * (high - low)
-        inside = band.isel(x=np.flatnonzero((band["x"].values >= low - slack) & (band["x"].values <= high + slack)))
         probability = band.attrs.get("probability")
         label = "band" if probability is None else f"{percent(probability)} band"
-        lower, upper = inside["lower"].values, inside["upper"].values
-        ax.fill_between(inside["x"].values, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5, label=label)
-        if "median" in inside:
-            ax.plot(inside["x"].values, inside["median"].values, color=PALETTE["median"], linewidth=1.0, label="median")
+        slack = 1e-9 * (high - low)
+        band = band.isel(x=(band["x"].values >= low - slack) & (band["x"].values <= high + slack))
+        at, style = band["x"].values, {"color": PALETTE["band"], "linewidth": 0.5, "zorder": 1.5, "label": label}
+        ax.fill_between(at, band["lower"].values, band["upper"].values, **style)
+        if "median" in band:
+            ax.plot(at, band["median"].values, color=PALETTE["median"], linewidth=1.0, label="median")
     if truth is not None:
         ax.plot(*outline(truth, low, high), label="true contour", **TRUTH)
     if contacts is not None:
@@ -149,10 +138,6 @@ def band_detail(
         A further band, of the shape alone (`contour_band(..., align="translation")`), drawn from its own median.
     ax : Axes, optional
 
-    Returns
-    -------
-    Axes
-
     Examples
     --------
     >>> import xarray as xr
@@ -160,7 +145,7 @@ def band_detail(
     >>> band_detail(xr.Dataset(flat, coords={"x": [0.0, 1.0]})).get_ylabel()
     '$y$ − median [$L$]'
     """
-    check_dataset(band, {"x", "lower", "median", "upper"}, *_BAND)
+    check_dataset(band, _EDGES, "band", "contour_band")
     ends = None if gap is None else _ends_of_gap(gap)
     ax = axes_for(ax, truth)
     x, median = band["x"].values, band["median"].values
@@ -169,7 +154,7 @@ def band_detail(
         _draw_gap(ax, *ends)
     ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5)
     if shape is not None:
-        check_dataset(shape, {"x", "lower", "median", "upper"}, *_BAND)
+        check_dataset(shape, _EDGES, "band", "contour_band")
         edges = [shape[edge].values - shape["median"].values for edge in ("lower", "upper")]
         ax.fill_between(shape["x"].values, *edges, zorder=1.6, label="band of the shape alone, up to a shift", **_SHAPE)
         legend_above(ax, 1, legend_entries(ax))
@@ -184,11 +169,86 @@ def band_detail(
     return ax
 
 
+def overlaid(
+    bands: Mapping[str, xr.Dataset],
+    *,
+    contacts: Mapping[str, xr.Dataset] | None = None,
+    overlay: Overlay | None = None,
+    enlarged: bool = False,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw bands of several runs over each other, and over another contour.
+
+    Parameters
+    ----------
+    bands : mapping of str to xr.Dataset
+        Bands by the name of the run, from `contour_band`.
+    contacts : mapping of str to xr.Dataset, optional
+        Contact points of these runs: contact_x and contact_y; if present, only those with status "ok" are drawn.
+    overlay : Overlay, optional
+        Another contour, from `tactile_bayes.uncertainty.read_overlay`.
+    enlarged : bool
+        If True, y is measured from `overlay`, or without it from the median of the first run, so that narrow bands are
+        visible; contacts are then left out.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ParameterError
+        If there is no band, or something is none.
+
+    Examples
+    --------
+    >>> flat = {"lower": ("x", [0.4, 0.4]), "median": ("x", [0.5, 0.5]), "upper": ("x", [0.6, 0.6])}
+    >>> band = xr.Dataset(flat, coords={"x": [0.0, 1.0]})
+    >>> overlaid({"one": band, "two": band + 0.05}, enlarged=True).get_ylabel()
+    '$y$ − one [$L$]'
+    """
+    from tactile_bayes.uncertainty.overlay import Overlay  # loads the sampler
+
+    check_switch("enlarged", enlarged)
+    check_optional("overlay", overlay, Overlay, "give what read_overlay returned")
+    for name, found in (("bands", bands), ("contacts", contacts)):
+        check_mapping(name, found, "give datasets by the name of the run")
+    if not bands:
+        raise ParameterError("there are no bands: give at least one, by the name of its run")
+    for band in bands.values():
+        check_dataset(band, _EDGES, "band", "contour_band")
+    for points in (contacts or {}).values():
+        check_dataset(points, {"contact_x", "contact_y"}, "dataset of contact points", "reconstruct")
+    ax = axes_for(ax)
+    first = next(iter(bands))
+    reference = (overlay or Overlay.of_band(first, bands[first])) if enlarged else None
+    for (name, band), colour in zip(bands.items(), cycle(BASES), strict=False):
+        x, median = band["x"].values, band["median"].values
+        base = np.zeros(x.size) if reference is None else reference.polyline.height(x, median)
+        lower, upper = band["lower"].values - base, band["upper"].values - base
+        ax.fill_between(x, lower, upper, color=colour, alpha=0.3, linewidth=0.5, zorder=1.5)
+        ax.plot(x, median - base, color=colour, linewidth=1.0, label=name)
+        if contacts and name in contacts and not enlarged:
+            points = contacts[name].isel(sample=contacts_within(contacts[name], x.min(), x.max()))
+            ax.plot(points["contact_x"].values, points["contact_y"].values, color=colour, **_CONTACTS)
+    attrs: Mapping[Any, Any] = bands[first]["lower"].attrs or bands[first]["x"].attrs
+    limits = [*ax.get_xlim(), *ax.get_ylim()]
+    if overlay is not None:
+        for piece in overlay.polyline.pieces if reference is None else [np.array([limits[:2], [0.0, 0.0]]).T]:
+            ax.plot(*piece.T, **TRUTH, label=overlay.name)
+    ax.set(xlim=limits[:2], ylim=limits[2:])  # those of the bands: a drawing may be much larger
+    if reference is None:
+        finish_map(ax, attrs)
+        return ax
+    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, np.array(limits[:2]))
+    set_unit(ax.yaxis, f"{LABELS['contact_y']} − {reference.name} ", "contact_y", attrs, np.array(limits[2:]))
+    legend_above(ax, min(4, len(legend_entries(ax))), legend_entries(ax))
+    return ax
+
+
 def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = None) -> Axes:
     """Draw certificate and band of the contour inside the gap, measured from the chord between the end contacts.
 
     Convexity alone confines the contour to the triangle, with a paler rim for the uncertainty of the end contacts; the
-    bands are the posterior's. The legend gives the largest width of each in y.
+    bands are the posterior's. The legend gives the largest width of each in y. If the sweeps overlap, the Axes hold a
+    note instead.
 
     Parameters
     ----------
@@ -198,19 +258,13 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
         The true contour.
     ax : Axes, optional
 
-    Returns
-    -------
-    Axes
-        If the sweeps overlap, the Axes hold a note instead.
-
     Examples
     --------
     >>> from tactile_bayes import gap as gap_of
-    >>> draws = {"a": 0.5, "q": 0.3, "x_c": 0.0}
     >>> ends = {"first_contact_x": [0.9, -0.9], "snap_off_contact_x": [0.1, -0.1], "snap_off_drive_angle": [3.2, -0.1]}
-    >>> posterior = xr.Dataset({k: (("chain", "draw"), [[v]]) for k, v in draws.items()})
+    >>> posterior = xr.Dataset({k: (("chain", "draw"), [[v]]) for k, v in {"a": 0.5, "q": 0.3, "x_c": 0.0}.items()})
     >>> events = xr.Dataset({k: (("chain", "draw", "segment"), [[v]]) for k, v in ends.items()})
-    >>> events = events.assign_coords(segment=["forward", "backward"])
+    >>> events["segment"] = ["forward", "backward"]
     >>> tree = xr.DataTree.from_dict({"posterior": posterior, "events": events})
     >>> tree.attrs = {"family": "parabola", "units": "dimensionless"}
     >>> gap(gap_of(tree)).get_ylabel()
@@ -218,16 +272,16 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     """
     check_dataset(found, _GAP, "gap", "gap", ["probability"])
     ax = axes_for(ax, truth)
-    attrs = found["left"].attrs
     middle = {name: float(found[name].sel(bound="median")) for name, v in found.items() if v.dims == ("bound",)}
     if not middle["left"] < middle["right"]:
         return write_instead(ax, "the sweeps overlap: no gap is left")
+    x, attrs, share = found["x"].values, found["left"].attrs, percent(found.attrs["probability"])
     ends = np.array([middle["left"], middle["right"]])
-    heights = np.array([middle["left_y"], middle["right_y"]])
-    incline = float(np.diff(heights)[0] / np.diff(ends)[0])
+    margin = _MARGIN * float(np.ptp(ends))
+    incline = (middle["right_y"] - middle["left_y"]) / float(np.ptp(ends))
 
     def above_chord(x: Floats, y: Floats) -> Floats:
-        return y - (heights[0] + incline * (x - ends[0]))
+        return y - (middle["left_y"] + incline * (x - ends[0]))
 
     def edges(name: str, *which: str) -> list[Floats]:
         return [above_chord(x, found[f"{name}_{edge}"].values) for edge in which]
@@ -236,12 +290,9 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
         power, unit = shown_unit("contact_x", attrs, np.array([float(width)]))
         return f"{number(float(width), power, digits=3)} {unit} wide"
 
-    x = found["x"].values
-    margin = _MARGIN * float(np.diff(ends)[0])
-    share = percent(found.attrs["probability"])
     least, most = edges("triangle", "lower", "upper")
     corners_x = np.array([ends[0], middle["apex_x"], ends[1]])
-    corners_y = above_chord(corners_x, np.array([heights[0], middle["apex_y"], heights[1]]))
+    corners_y = above_chord(corners_x, np.array([middle["left_y"], middle["apex_y"], middle["right_y"]]))
     style: dict[str, Any] = {"linewidth": 0.0, "color": PALETTE["gap"]}
     label = f"triangle of chord and tangents, {wide(middle['triangle_width'])}"
     ax.fill(corners_x, corners_y, alpha=0.45, zorder=0.6, label=label, **style)
@@ -307,9 +358,8 @@ def _ends_of_gap(gap: Any) -> tuple[float, float]:
 
 
 def _draw_gap(ax: Axes, begin: float, end: float) -> None:
-    left, right = sorted((begin, end))
-    overlap = begin > end
-    draw_gap(ax, left, right, "overlap" if overlap else "gap", hatched=not overlap)
+    is_gap = begin <= end
+    draw_gap(ax, min(begin, end), max(begin, end), "gap" if is_gap else "overlap", hatched=is_gap)
 
 
 def _draw_ends(ax: Axes, found: xr.Dataset, above_chord: Any) -> None:

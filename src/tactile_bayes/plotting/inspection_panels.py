@@ -8,11 +8,10 @@ import numpy as np
 
 from tactile_bayes.checks import check_kind
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
-from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
+from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis, finish_channels, reading_style
 from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.marks import PALETTE
-from tactile_bayes.plotting.sweep_lines import finish_channels, reading_style
 from tactile_bayes.record import CHANNELS, present_channels
 
 if TYPE_CHECKING:
@@ -40,16 +39,11 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     inspected : Inspection
         From `tactile_bayes.inspect_record`.
     axes : array of Axes, shape (3, 2), optional
-        A row for each of holding_moment, force_x and force_y. The left Axes hold readings over the drive angle,
-        the travel of the base, or the number of the sample, as in `observables`:
-        vertical lines between the samples beside first contact (dotted) and snap-off (dashed) have the colour of the
-        sweep's direction; rings and other marks show samples that look wrong. The right Axes hold readings of the
-        unloaded samples in the order of measurement, with their mean and two standard deviations to either side.
-
-    Returns
-    -------
-    ndarray of Axes, shape (3, 2)
-        Drive angles are in degrees, and travels in the record's unit of length, or its thousandth.
+        A row for each of holding_moment, force_x and force_y. The left Axes hold readings over the coordinate of
+        `observables`: vertical lines between the samples beside first contact (dotted) and snap-off (dashed) have the
+        colour of the sweep's direction; rings and other marks show samples that look wrong. The right Axes hold
+        readings of the unloaded samples in the order of measurement, with their mean and two standard deviations to
+        either side.
 
     Raises
     ------
@@ -84,8 +78,7 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
         _draw_readings(readings, inspected, index, along)
         set_unit(readings.yaxis, f"{label}\n", channel, record[channel].attrs, record[channel].values)
         _draw_unloaded(zero, inspected, index)
-        unloaded = record[channel].values[inspected.samples.unloaded.values]
-        set_unit(zero.yaxis, "", channel, record[channel].attrs, unloaded)
+        set_unit(zero.yaxis, "", channel, record[channel].attrs, record[channel].values[inspected.samples.unloaded])
     along.label(panels[-1, 0].xaxis, with_ticks=False)
     panels[-1, 1].set_xlabel("sample")
     panels[0, 1].set_title("unloaded", fontsize="small")

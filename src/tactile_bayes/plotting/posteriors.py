@@ -31,6 +31,9 @@ _TRUTH: dict[str, Any] = {"color": PALETTE["change"], "linestyle": "--", "linewi
 def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = None, axes: Any = None) -> AxesArray:
     """Draw the trace of each chain, and its density: chains that agree look alike.
 
+    The left Axes hold the draws in their order, thinned to at most 500 a chain, the right ones a histogram for each
+    chain.
+
     Parameters
     ----------
     posterior : xr.DataTree or xr.Dataset
@@ -39,12 +42,6 @@ def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = 
         Names of the variables; by default all.
     axes : array_like of Axes, shape (parameters, 2), optional
         One row for each parameter; a variable with further dimensions is one parameter for each of its elements.
-
-    Returns
-    -------
-    ndarray of Axes, shape (parameters, 2)
-        The left Axes hold the draws in their order, thinned to at most 500 a chain; the right ones a histogram for
-        each chain.
 
     Raises
     ------
@@ -97,26 +94,18 @@ def pairs(
     """Draw the marginals of the posterior, one by one and in pairs.
 
     The diagonal holds histograms, with the central 95 % interval dark; below it are the highest-density regions of 50 %
-    and 95 % of the draws, from a histogram smoothed by one bin.
+    and 95 % of the draws, from a histogram smoothed by one bin. Axes above the diagonal are switched off. A figure of
+    more than six parameters (seven in print) is wider than 7 inches, so that labels fit: for a page, choose `names`.
 
     Parameters
     ----------
-    posterior : xr.DataTree or xr.Dataset
-        Tree with a group "posterior", or that dataset: variables over "chain" and "draw".
-    names : sequence of str, optional
-        Names of the variables; by default all.
+    posterior, names
+        As in `trace`.
     truth : mapping of str to float, optional
         True values by name of the parameter, in its unit; drawn as dashed lines. It may have more parameters than
         `names`, and none that the posterior lacks.
     axes : array_like of Axes, shape (parameters, parameters), optional
-        One for each pair of parameters; a variable with further dimensions is one parameter for each of its elements.
-        Above the diagonal None will do.
-
-    Returns
-    -------
-    ndarray of Axes, shape (parameters, parameters)
-        Axes above the diagonal are switched off. A figure of more than six parameters (seven in print) is wider than 7
-        inches, so that labels fit: for a page, choose `names`.
+        One for each pair of parameters, as in `trace`. Above the diagonal None will do.
 
     Raises
     ------
@@ -196,13 +185,11 @@ def _parameters(posterior: xr.DataTree | xr.Dataset, names: Sequence[str] | None
     parameters = []
     for name in names or known:
         values = posterior[name].transpose("chain", "draw", ...)
-        stated = str(values.attrs.get("units", "1"))
-        unit = "" if stated == "1" else stated
+        unit = str(values.attrs.get("units", "1"))
         for index in np.ndindex(values.shape[2:]):
-            inside = ", ".join(map(str, index))
-            element, label = (f"{name}[{inside}]", f"{_symbol(name)}[{inside}]") if index else (name, _symbol(name))
-            draws = np.asarray(values.values[(slice(None), slice(None), *index)], dtype=float)
-            parameters.append(_Parameter(element, label, unit, draws))
+            element = f"[{', '.join(map(str, index))}]" if index else ""
+            draws = values.values[:, :, *index].astype(float)
+            parameters.append(_Parameter(name + element, _symbol(name) + element, "" if unit == "1" else unit, draws))
     return parameters
 
 

@@ -55,10 +55,6 @@ def prior_contours(
         The true contour.
     ax : Axes, optional
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ParameterError
@@ -105,10 +101,6 @@ def posterior_contours(
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------

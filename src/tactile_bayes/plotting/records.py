@@ -11,12 +11,19 @@ import xarray as xr
 from tactile_bayes.checks import check_kind, check_mapping
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
-from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
+from tactile_bayes.plotting.drive_axis import (
+    DriveAxis,
+    draw_events,
+    drive_axis,
+    finish_channels,
+    phase_runs,
+    reading_style,
+    with_events,
+)
 from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
-from tactile_bayes.plotting.sweep_lines import draw_events, finish_channels, phase_runs, reading_style, with_events
-from tactile_bayes.record import CHANNELS, Frame, frame_of, validate
+from tactile_bayes.record import CHANNELS, frame_of, validate
 from tactile_bayes.sweep import SweepEvents
 
 if TYPE_CHECKING:
@@ -26,6 +33,7 @@ if TYPE_CHECKING:
 _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
 _ENDS = ("lower", "upper")
 _ALONG = "along_drive"  # variable with the coordinate of a sample in the figure
+_IN_ORDER = ("forward", "backward", "tip contact", "tangential contact", "truth", "first", "change", "snap")
 _FARTHEST = 8.0  # largest residual within a panel's limits: a single outlier must not flatten all others
 _TURNING_LABELS = {
     **LABELS,
@@ -37,12 +45,13 @@ _TURNING_LABELS = {
 def observables(
     record: xr.Dataset, *, events: Mapping[str, SweepEvents] | None = None, axes: Sequence[Axes] | None = None
 ) -> AxesArray:
-    """Draw holding moment and support reaction over the drive angle, like Figures 3 to 6 of Merker et al. 2018.
+    """Draw holding moment and support reaction along the drive, like Figures 3 to 6 of Merker et al. 2018.
 
     The paper's doi is 10.1155/2018/1613945. A record without noise, as `scan` returns it, is drawn as lines coloured by
     contact phase; any other record as points, with its truth, if it has one, as thin lines. Forces are drawn in the
-    frame of the record. A record of drives that carry the base is drawn over the travel of the base; one in which the
-    drive turns in some sweeps and carries the base in others over the number of the sample, sweep beside sweep.
+    frame of the record. The coordinate is the drive angle [°]; for drives that carry the base it is the travel of the
+    base, in the record's unit of length or its thousandth; for records with drives of both kinds it is the number of
+    the sample, sweep beside sweep.
 
     Parameters
     ----------
@@ -53,11 +62,6 @@ def observables(
         marked.
     axes : sequence of 3 Axes, optional
         One for each of holding_moment, force_x and force_y.
-
-    Returns
-    -------
-    ndarray of Axes, shape (3,)
-        Drive angles are in degrees, and travels in the record's unit of length, or its thousandth.
 
     Raises
     ------
@@ -71,8 +75,7 @@ def observables(
     >>> from tactile_bayes import scan
     >>> from tactile_bayes.contours import paper_profile
     >>> result = scan(paper_profile("II", q=0.5))
-    >>> axes = observables(result.record, events=result.events)
-    >>> axes[-1].get_xlabel()
+    >>> observables(result.record, events=result.events)[-1].get_xlabel()
     'drive angle $\\\\varphi_0$ [°]'
     """
     record = validate(record)
@@ -80,9 +83,8 @@ def observables(
     check_mapping("events", events, correction)
     for name, of_sweep in (events or {}).items():
         check_kind(f"events[{name!r}]", of_sweep, SweepEvents, correction)
-    panels = _panels(axes)
-    along = drive_axis(record)
-    _draw_observables(panels, record, events, along, with_truth=True)
+    panels, along = _panels(axes), drive_axis(record)
+    _draw_observables(panels, record, along, events or {}, with_truth=True)
     _finish_panels(panels, along, axes is None)
     return panels
 
@@ -99,7 +101,8 @@ def predictive(
 
     A residual is a reading less the middle of its interval, over half the interval's width: within ±1 the reading lies
     in the interval. Misfit enlarges the inferred noise, so that misfitting readings may lie in their intervals; their
-    residuals then drift instead of scattering.
+    residuals then drift instead of scattering. A new figure has residuals below each channel; the Axes returned are
+    those of the channels.
 
     Parameters
     ----------
@@ -109,16 +112,11 @@ def predictive(
         Over "sample" as the record, from `predictive_interval`: for a channel such as force_x the interval is
         force_x_lower to force_x_upper, in the units and the frame of the record. Intervals may be missing.
     axes : sequence of 3 Axes, optional
-        One for each of holding_moment, force_x and force_y.
+        One for each of holding_moment, force_x and force_y, over the coordinate of `observables`.
     residuals : sequence of 3 Axes, optional
         Axes for the residuals of each channel; if `axes` alone are given, residuals are not drawn.
     label : str
         Label of the interval in the legend.
-
-    Returns
-    -------
-    ndarray of Axes, shape (3,)
-        Axes of the channels over the coordinate of `observables`. A new figure has residuals below each channel.
 
     Raises
     ------
@@ -161,7 +159,7 @@ def predictive(
     else:
         panels, below = _panels(axes), np.full(3, None) if residuals is None else _panels(residuals)
     along = drive_axis(record)
-    _draw_observables(panels, record, None, along, with_truth=False)
+    _draw_observables(panels, record, along, {}, with_truth=False)
     for channel, panel, ax in zip(CHANNELS, panels, below, strict=True):
         if f"{channel}_lower" not in predicted or np.isnan(record[channel].values).all():
             if ax is not None:
@@ -193,8 +191,8 @@ def _draw_residuals(ax: Axes, sweep: xr.Dataset, channel: str) -> None:
     direction = str(sweep["direction"].values[0])
     style: dict[str, Any] = {"color": _SWEEPS[direction], "marker": SWEEP_MARKERS[direction], "markersize": 2.2}
     style |= {"markeredgewidth": 0.0, "linestyle": SWEEP_LINES[direction], "linewidth": 0.5}
-    style |= {"label": f"residual {direction}"}
-    ax.plot(sweep[_ALONG].values, np.where(np.isfinite(off), off, np.nan), **style)
+    off[~np.isfinite(off)] = np.nan
+    ax.plot(sweep[_ALONG].values, off, label=f"residual {direction}", **style)
 
 
 def _finish_residuals(ax: Axes) -> None:
@@ -218,20 +216,13 @@ def _finish_panels(panels: AxesArray, along: DriveAxis, own: bool, columns: int 
 
 def _legend_order(label: str) -> int:
     """Return the rank of a label: directions, then phases, then the rest in the order of the sweep."""
-    words = ("forward", "backward", "tip contact", "tangential contact", "truth", "first", "change", "snap")
-    return next((i for i, word in enumerate(words) if word in label), len(words))
+    return next((rank for rank, word in enumerate(_IN_ORDER) if word in label), len(_IN_ORDER))
 
 
 def _draw_observables(
-    panels: AxesArray,
-    record: xr.Dataset,
-    events: Mapping[str, SweepEvents] | None,
-    along: DriveAxis,
-    *,
-    with_truth: bool,
+    panels: AxesArray, record: xr.Dataset, along: DriveAxis, events: Mapping[str, SweepEvents], *, with_truth: bool
 ) -> None:
-    frame = frame_of(record)
-    labels = LABELS if frame == "fixed" else _TURNING_LABELS
+    labels = LABELS if frame_of(record) == "fixed" else _TURNING_LABELS
     for panel, channel in zip(panels, CHANNELS, strict=True):
         if np.isnan(record[channel].values).all():
             write_not_measured(panel, f"{labels[channel]}\n")
@@ -239,20 +230,19 @@ def _draw_observables(
         along.draw_below(panel)
         for sweep in _sweeps(record, along):
             direction = str(sweep["direction"].values[0])
-            of_sweep = events.get(direction) if events is not None and along.kind != "sample" else None
+            of_sweep = None if along.kind == "sample" else events.get(direction)
             if _is_exact(sweep, channel):
-                _draw_line(panel, sweep, channel, channel, of_sweep, frame, along, linewidth=1.6)
+                _draw_line(panel, sweep, channel, of_sweep, along, linewidth=1.6)
                 legend_entry(panel, direction, color="0.35", linestyle=SWEEP_LINES[direction], linewidth=1.6)
             else:
                 style = reading_style(direction, PALETTE["sample"])
                 panel.plot(sweep[_ALONG].values, sweep[channel].values, **style)
                 legend_entry(panel, f"measured {direction}", **style)
                 if with_truth and f"truth_{channel}" in sweep:
-                    _draw_line(panel, sweep, f"truth_{channel}", channel, of_sweep, frame, along, linewidth=1.0)
+                    _draw_line(panel, sweep, f"truth_{channel}", of_sweep, along, linewidth=1.0)
             if of_sweep is not None:
-                draw_events(panel, of_sweep, channel, frame, travels=along.kind == "travel")
-        values = record[channel].values
-        set_unit(panel.yaxis, f"{labels[channel]}\n", channel, record[channel].attrs, values)
+                draw_events(panel, of_sweep, channel, frame_of(record), travels=along.kind == "travel")
+        set_unit(panel.yaxis, f"{labels[channel]}\n", channel, record[channel].attrs, record[channel].values)
 
 
 def _sweeps(record: xr.Dataset, along: DriveAxis) -> Iterator[xr.Dataset]:
@@ -270,15 +260,7 @@ def _is_exact(sweep: xr.Dataset, channel: str) -> bool:
 
 
 def _draw_line(
-    ax: Axes,
-    sweep: xr.Dataset,
-    column: str,
-    channel: str,
-    events: SweepEvents | None,
-    frame: Frame,
-    along: DriveAxis,
-    *,
-    linewidth: float,
+    ax: Axes, sweep: xr.Dataset, column: str, events: SweepEvents | None, along: DriveAxis, linewidth: float
 ) -> None:
     """Draw a channel without noise, coloured by phase, and complete up to the events."""
     angle, value = sweep[_ALONG].values, sweep[column].values
@@ -286,17 +268,17 @@ def _draw_line(
         angle = np.degrees(sweep["truth_drive_angle"].values)
     direction = str(sweep["direction"].values[0])
     style: dict[str, Any] = {"linestyle": SWEEP_LINES[direction], "linewidth": linewidth, "zorder": 2.5}
-    phase = sweep["truth_contact_phase"].values.astype(object) if "truth_contact_phase" in sweep else None
-    if phase is None:
+    if "truth_contact_phase" not in sweep:
         ax.plot(angle, value, color=PALETTE["change"], **style)
         legend_entry(ax, "truth", color=PALETTE["change"], linewidth=linewidth)
         return
+    phase, channel = sweep["truth_contact_phase"].values.astype(object), column.removeprefix("truth_")
     if events is not None:
         travels = along.kind == "travel"
-        angle, value, phase = with_events(angle, value, phase, events, channel, frame, travels=travels)
+        angle, value, phase = with_events(angle, value, phase, events, channel, frame_of(sweep), travels=travels)
     for run in phase_runs(phase):
         name = str(phase[run.start])
         ax.plot(angle[run], value[run], color=PALETTE[name], **style)
         if name in PHASES:
-            prefix = "true " if column != channel else ""
-            legend_entry(ax, prefix + PHASES[name], color=PALETTE[name], linewidth=linewidth)
+            label = PHASES[name] if column == channel else f"true {PHASES[name]}"
+            legend_entry(ax, label, color=PALETTE[name], linewidth=linewidth)

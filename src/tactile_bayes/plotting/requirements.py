@@ -1,18 +1,19 @@
-"""Requirements for a band of given width: the noise of the load cell, and the rod that suits a load cell."""
+"""Requirements and errors over the noise of the load cell, and over the size of the rod."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.axes import axes_for, check_dataset, group_of, tile_edges, write_instead
+from tactile_bayes.checks import check_choice
+from tactile_bayes.plotting.axes import axes_for, check_among, check_dataset, group_of, tile_edges, write_instead
 from tactile_bayes.plotting.labels import number, percent, set_log_scale, set_unit, show_numbers, shown_unit
-from tactile_bayes.plotting.legends import legend, legend_above
-from tactile_bayes.plotting.marks import BEST, PALETTE
+from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
+from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,24 +26,25 @@ _REFUSED: dict[str, dict[str, Any]] = {
     "does not reach": {"facecolor": "0.9", "edgecolor": "0.6", "hatch": "xx"},
     "cannot be swept": {"facecolor": "0.9", "edgecolor": "0.6", "hatch": ".."},
 }
+Quantity = Literal["across", "along", "touched", "gap"]
+
+_MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]
+_MOST_TICKS = 8
+_MOST_IN_LINE = 6  # largest number of legend entries in a row
+_BANDS = {"touched": "where it is touched", "gap": "in the gap"}
 
 
 def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> Axes:
     """Draw the expected mean width of the band over the noise of the load cell, both logarithmic.
 
     The lower axis is the noise of the forces, the upper axis the noise of the moment in proportion. The plan's own load
-    cell is marked.
+    cell is marked. If the priors alone give every band that was asked for, the Axes hold a note instead.
 
     Parameters
     ----------
     found : xr.Dataset or xr.DataTree
         Result of `tactile_bayes.sensitivity`, or its group "required_noise".
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
-        If the priors alone give every band that was asked for, the Axes hold a note instead.
 
     Raises
     ------
@@ -94,7 +96,7 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
 
 
 def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """Draw the expected mean width of the band over the length and the diameter of the rod.
+    """Draw the expected mean width of the band over the length and the diameter of the rod, with a colour bar.
 
     Rods that are bent too far, touch little or nothing of the contour, or cannot be swept, are hatched; among the
     others, the rod with the narrowest band is marked.
@@ -105,11 +107,6 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         From `tactile_bayes.planning.required_rod`.
     ax : Axes, optional
 
-    Returns
-    -------
-    Axes
-        The figure also holds the colour bar.
-
     Raises
     ------
     ParameterError
@@ -118,18 +115,11 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from matplotlib.figure import Figure
-    >>> metres = {"units": "m"}
-    >>> found = xr.Dataset(
-    ...     {
-    ...         "width": (("length", "diameter"), [[2e-4, 1e-4], [4e-4, 3e-4]], metres),
-    ...         "status": (("length", "diameter"), [["ok", "bent too far"], ["ok", "ok"]]),
-    ...         "best_length": 0.1,
-    ...         "best_diameter": 2e-4,
-    ...         "best_width": 2e-4,
-    ...     },
-    ...     coords={"length": ("length", [0.1, 0.2], metres), "diameter": ("diameter", [2e-4, 4e-4], metres)},
-    ...     attrs={"probability": 0.95, "where": "everywhere"},
-    ... )
+    >>> dims, metres = ("length", "diameter"), {"units": "m"}
+    >>> sizes = {"length": ("length", [0.1, 0.2], metres), "diameter": ("diameter", [2e-4, 4e-4], metres)}
+    >>> found = xr.Dataset({"width": (dims, [[2e-4, 1e-4], [4e-4, 3e-4]], metres)}, sizes, {"probability": 0.95})
+    >>> found["status"] = dims, [["ok", "bent too far"], ["ok", "ok"]]
+    >>> found = found.assign(best_length=0.1, best_diameter=2e-4, best_width=2e-4)
     >>> required_rod(found, ax=Figure().subplots()).get_xlabel()
     'length of the rod [mm]'
     """
@@ -190,3 +180,110 @@ def _band_in_words(found: xr.Dataset) -> str:
 def _plain(attrs: Mapping[Any, Any], si: str) -> dict[str, str]:
     """Return the unit as records state it: "1" for quantities in units of the rod."""
     return {"units": si if attrs.get("units") == si else "1"}
+
+
+def error_map(
+    found: xr.Dataset,
+    *,
+    quantity: Quantity = "across",
+    reconstruction: Literal["raw", "constrained"] = "constrained",
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw errors of contacts, or widths of bands, over the noise: a line for each contour and distance.
+
+    For contacts, a solid line is the root mean square error of those with the status "ok", and a dashed line its
+    first-order prediction. For bands, filled markers are widths of posterior bands, where some were inferred, and
+    dashed lines with hollow markers are widths expected from Fisher's information. Where the two part, first order
+    ceases to hold. Colours denote contours, markers distances. Combinations without any result are left out, and named.
+
+    Parameters
+    ----------
+    found : xr.Dataset
+        From `tactile_bayes.planning.error_map`.
+    quantity : {"across", "along", "touched", "gap"}
+        Errors of contacts across the contour or along it, or widths of bands where it is touched or in the gap.
+    reconstruction : {"raw", "constrained"}
+        Method of Step 2 that made the contacts.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ParameterError
+        If the argument is not an error map, or does not hold the choice.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from tactile_bayes.planning import error_map as error_map_of
+    >>> study = error_map_of(["II"], over={"noise_factor": [0.1, 1.0]}, replicates=1, rng=1, workers=1)
+    >>> error_map(study, ax=Figure().subplots()).get_ylabel()
+    'RMS error across the contour [$L$]'
+    """
+    check_dataset(found, {"rms_across", "contour", "distance", "noise_factor"}, "error map", "error_map")
+    check_choice("quantity", quantity, ("across", "along", *_BANDS))
+    check_among("reconstruction", reconstruction, found)
+    ax = axes_for(ax)
+    found = found.isel(noise_factor=np.argsort(found["noise_factor"].values))
+    observed, predicted, label, title = _drawn(found, quantity, reconstruction)
+    factor, contours, distances = (found[name].values for name in ("noise_factor", "contour", "distance"))
+    is_band = quantity in _BANDS
+    drawn: list[Floats] = []
+    missing: list[str] = []
+    is_there = np.zeros((contours.size, distances.size), dtype=bool)
+    for i, j in np.ndindex(is_there.shape):
+        there, first = observed.values[i, j], predicted.values[i, j]
+        if not np.isfinite([*there, *first]).any():
+            missing.append(f"{contours[i]} at {number(float(distances[j]))} L")
+            continue
+        is_there[i, j] = True
+        drawn += [there, first]
+        style: dict[str, Any] = {"color": BASES[i % len(BASES)], "linewidth": 1.3}
+        mark = _MARKS[j % len(_MARKS)]
+        hollow = mark | {"markerfacecolor": "white"} if is_band or factor.size == 1 else {}
+        ax.plot(factor, first, linestyle="--", zorder=2, **style, **hollow)
+        ax.plot(factor, there, linestyle="none" if is_band else "-", zorder=3, **style, **mark)
+    if not drawn:
+        return write_instead(ax, "there is no gap" if quantity == "gap" else "no cell of this map has a result")
+    for i in np.flatnonzero(is_there.any(axis=1)):
+        legend_entry(ax, str(contours[i]), color=BASES[i % len(BASES)], linewidth=2.5)
+    for j in np.flatnonzero(is_there.any(axis=0)):
+        legend_entry(ax, f"at {number(distances[j])} L", color="0.35", linestyle="none", **_MARKS[j % len(_MARKS)])
+    legend_entry(ax, "first order", color="0.35", linestyle="--", linewidth=1.3)
+    set_log_scale(ax.yaxis, label, "contact_x", predicted.attrs, np.concatenate(drawn))
+    set_log_scale(ax.xaxis, _noise_label(found), "sweep", {}, factor)
+    if factor.size <= _MOST_TICKS:
+        ax.set_xticks(factor)
+    entries = len(ax.get_legend_handles_labels()[1])
+    legend_above(ax, entries if entries <= _MOST_IN_LINE else -(-entries // 2), title=title)
+    if missing:
+        corner: dict[str, Any] = {"transform": ax.transAxes, "ha": "right", "va": "bottom"}
+        ax.text(0.99, 0.02, f"no result: {', '.join(missing)}", fontsize="small", color="0.35", **corner)
+    return ax
+
+
+def _drawn(found: xr.Dataset, quantity: str, reconstruction: str) -> tuple[xr.DataArray, xr.DataArray, str, str]:
+    """Return what was observed and predicted, over contour, distance and noise_factor, its label and a title."""
+    if quantity in _BANDS:
+        both = found[f"posterior_{quantity}_width"], found[f"expected_{quantity}_width"]
+        label = f"mean width of the {percent(found.attrs['probability'])} band"
+        title = f"bands {_BANDS[quantity]}" + (": filled markers are posteriors" if both[0].notnull().any() else "")
+    else:
+        of_method = found.sel(reconstruction=reconstruction)
+        both = of_method[f"rms_{quantity}"], of_method[f"first_order_{quantity}"]
+        label = f"RMS error {quantity} the contour"
+        title = f'{reconstruction} contact points with the status "ok"'
+    observed, predicted = (each.transpose("contour", "distance", "noise_factor") for each in both)
+    return observed, predicted, label, title
+
+
+def _noise_label(found: xr.Dataset) -> str:
+    """Return the label of the noise factor, with the noise at factor 1 if known."""
+    if "force_noise" not in found.variables or "moment_noise" not in found.variables:
+        return "noise factor"
+    units = {"units": "1"} if found["rms_across"].attrs.get("units", "1") == "1" else None
+    words = []
+    for name, column, unit in (("force_noise", "force_x", "N"), ("moment_noise", "holding_moment", "N m")):
+        one = float(found[name].values[0] / found["noise_factor"].values[0])
+        power, shown = shown_unit(column, units or {"units": unit}, np.array([one]))
+        words.append(f"{number(one, power, digits=3)} {shown}")
+    return f"noise factor (1 is {' and '.join(words)})"

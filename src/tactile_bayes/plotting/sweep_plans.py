@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -18,26 +17,11 @@ from tactile_bayes.plotting.marks import BASES, SWEEP_LINES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-READING_COLOURS: Mapping[str, str] = {
-    "holding_moment": BASES[0],
-    "force_x": BASES[1],
-    "force_y": BASES[3],
-    "drive_angle": BASES[2],
-}
-METHOD_COLOURS: Mapping[str, str] = {"raw": "#D55E00", "constrained": "#0072B2"}
-_TOGETHER = "0.75"
-
-_VARIABLES = {
-    "sd_along",
-    "sd_across",
-    "holds",
-    "contact_phase",
-    "after_first_contact",
-    "before_snap_off",
-    "reconstruction",
-}
+READING_COLOURS = {"holding_moment": BASES[0], "force_x": BASES[1], "force_y": BASES[3], "drive_angle": BASES[2]}
+METHOD_COLOURS = {"raw": "#D55E00", "constrained": "#0072B2"}
 _STYLES = {"along": "-", "across": "--"}
-
+_GROWN = {"sd_along", "sd_across", "holds", "contact_phase", "reconstruction"}
+_GROWN |= {"after_first_contact", "before_snap_off"}
 # Distance from first contact and snap-off, over the sweep's length, beyond which all errors are within the limits.
 _CLOSEST = 0.004
 _STRIP = 0.035  # height of the strips below the curves, over that of the Axes
@@ -58,11 +42,6 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
         Number of the sweep.
     ax : Axes, optional
 
-    Returns
-    -------
-    Axes
-        Drive angles are in degrees.
-
     Raises
     ------
     ParameterError
@@ -76,35 +55,31 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     >>> amplification(found, ax=Figure().subplots()).get_ylabel()
     'standard deviation of a contact point [$L$]'
     """
-    grown = _of_sweep(group_of(found, "amplification", _VARIABLES), sweep)
+    grown = _of_sweep(group_of(found, "amplification", _GROWN), sweep)
     ax = axes_for(ax)
     angle = np.degrees(grown["drive_angle"].values)
     first, last = _events(grown)
     near = np.minimum(grown["after_first_contact"].values, grown["before_snap_off"].values)
     is_shown = near >= _CLOSEST * np.radians(abs(last - first))
     drawn: list[Floats] = []
-    methods = [str(name) for name in grown["reconstruction"].values]
-    for row, method in enumerate(methods):
+    for row, method in enumerate(map(str, grown["reconstruction"].values)):
         of_method, colour = grown.sel(reconstruction=method), METHOD_COLOURS[method]
-        holds = of_method["holds"].values
-        phase = of_method["contact_phase"].values
+        holds, phase = of_method["holds"].values, of_method["contact_phase"].values
         # Constrained errors jump where the phase changes, so their line is interrupted; raw ones ignore the phase.
         changes = np.flatnonzero((phase[1:] != phase[:-1]) & (method == "constrained")) + 1
         for side, style in _STYLES.items():
             deviation = of_method[f"sd_{side}"].values
             drawn.append(deviation[is_shown])
-            certain = np.where(_joined(holds), deviation, np.nan)
-            doubtful = np.where(_joined(~holds), deviation, np.nan)
-            lines = ((doubtful, 0.7, None), (certain, 1.8, f"{method}, {side} the contour"))
-            for values, width, label in lines:
+            lines = ((~holds, 0.7, None), (holds, 1.8, f"{method}, {side} the contour"))
+            for chosen, width, label in lines:
+                values = np.where(_joined(chosen), deviation, np.nan)
                 split = np.insert(angle, changes, angle[changes]), np.insert(values, changes, np.nan)
                 ax.plot(*split, style, color=colour, linewidth=width, label=label)
         low = row * _STRIP
         for begin, end in _runs(~holds, angle):
             ax.axvspan(begin, end, low, low + _STRIP, color=colour, alpha=0.35, linewidth=0.0)
-    set_log_scale(
-        ax.yaxis, "standard deviation of a contact point", "contact_x", grown["sd_along"].attrs, np.concatenate(drawn)
-    )
+    label, attrs = "standard deviation of a contact point", grown["sd_along"].attrs
+    set_log_scale(ax.yaxis, label, "contact_x", attrs, np.concatenate(drawn))
     bottom, top = ax.get_ylim()
     ax.set_ylim(bottom * (bottom / top) ** (2.0 * _STRIP), top)
     _mark_events(ax, first, last)
@@ -120,19 +95,14 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     """Draw the leverage of every reading over the drive angle, by channel and direction.
 
     The leverage of a reading is its diagonal element of the hat matrix, between 0 and 1: the number of parameters that
-    it determines. The sum over all readings is the number of parameters that the record determines. Readings without
-    contact determine the load cell's zero.
+    it determines. The sum over all readings is the number of parameters that the record determines; the legend states
+    the sum for each channel. Readings without contact determine the load cell's zero.
 
     Parameters
     ----------
     found : xr.Dataset or xr.DataTree
         Result of `tactile_bayes.sensitivity`, or its group "information".
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
-        Drive angles are in degrees. The legend states the sum of the leverage for each channel.
 
     Raises
     ------
@@ -181,7 +151,8 @@ def noise_shares(
 
     The shares are first-order Sobol' indices (Sobol' 2001). The remainder to 1 is called "together": it comes from
     interactions of several noises, and is large where first order does not hold. Shares are estimates: those below 0
-    are drawn as 0, and a stack may rise a little above 1.
+    are drawn as 0, and a stack may rise a little above 1. Angles at which Step 2 has no solution for some of the noise
+    are hatched.
 
     Parameters
     ----------
@@ -194,11 +165,6 @@ def noise_shares(
     sweep : int
         Number of the sweep.
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
-        Drive angles are in degrees. Angles at which Step 2 has no solution for some of the noise are hatched.
 
     Raises
     ------
@@ -225,9 +191,9 @@ def noise_shares(
     is_answered = np.isfinite(share).all(axis=1)
     below = np.zeros(angle.size)
     together = np.maximum(1.0 - share.sum(axis=1), 0.0)
-    sources = [str(name) for name in chosen["source"].values]
+    sources = map(str, chosen["source"].values)
     stacked = [(share[:, i], READING_COLOURS[name], LABELS[name]) for i, name in enumerate(sources)]
-    for values, colour, label in (*stacked, (together, _TOGETHER, "together")):
+    for values, colour, label in (*stacked, (together, "0.75", "together")):
         height = np.where(is_answered, values, 0.0)
         ax.bar(angle, height, wide, below, color=colour, label=label, edgecolor="white", linewidth=0.6)
         below = below + height
@@ -274,9 +240,7 @@ def _mark_events(ax: Axes, first: float, last: float) -> None:
 
 def _joined(chosen: np.ndarray) -> np.ndarray:
     """Return the choice extended by each sample after a chosen one, so that thick and thin lines meet."""
-    near = chosen.copy()
-    near[1:] |= chosen[:-1]
-    return near
+    return chosen | np.append(False, chosen[:-1])
 
 
 def _runs(chosen: np.ndarray, angle: Floats) -> list[tuple[float, float]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_probability
+from tactile_bayes.checks import check_probability, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_drawing, check_panels, checked_samples
 from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, is_certain, radius_of
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 _DETAILS = "abc"
 _ON_MAP = 18
-_ALONG, _ACROSS = "#009E73", "#CC79A7"
+# Label, standard deviation, and colour of each ratio.
+_RATIOS = ("along the contour", "tangent_sd", "#009E73"), ("across it", "normal_sd", "#CC79A7")
 _IMPLIED = "#000000"
 _HIGHEST = 0.9  # largest height of the map over that of each row below it
 _PANEL = 0.25  # height of a row below the map over the width of the figure
@@ -61,10 +62,6 @@ def tightening(
     axes : array_like of Axes, shape (5,), optional
         Axes for the map, the three details, and the ratios.
 
-    Returns
-    -------
-    ndarray of Axes, shape (5,)
-
     Raises
     ------
     ParameterError
@@ -79,8 +76,7 @@ def tightening(
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> posterior = infer_contour(measured, rig=Rig(unknown="nothing"), rng=1, settings=quick)
-    >>> implied = implied_contacts(posterior, draws=50)
+    >>> implied = implied_contacts(infer_contour(measured, rig=Rig(unknown="nothing"), rng=1, settings=quick), draws=50)
     >>> tightening(implied, reconstruct(measured, method="constrained"))[-1].get_ylabel()
     'single sd / implied sd'
     """
@@ -99,8 +95,10 @@ def tightening(
     dots = {"color": _IMPLIED, "linestyle": "none", "marker": ".", "markersize": 1.2, "zorder": 4}
     panels[0].plot(x[shown], y[shown], **dots)
     legend_entry(panels[0], "implied by the contour", **dots | {"markersize": 6.0})
-    on_map = _on_the_map(shown, chosen)
-    contact_ellipses(loose, probability=probability, truth=truth, samples=on_map, ax=panels[0])
+    every = np.flatnonzero(shown)
+    some = every[((np.arange(_ON_MAP) + 0.5) / _ON_MAP * every.size).astype(int)]  # from the middles of equal parts
+    samples = np.union1d(some, chosen).tolist()
+    contact_ellipses(loose, probability=probability, truth=truth, samples=samples, ax=panels[0])
     if axes is None:
         _fit_map(panels[0])
     legend_above(panels[0], 2)
@@ -159,9 +157,7 @@ def _enlarged(shown: Any, implied: xr.DataTree, samples: Sequence[int] | None) -
     chosen = checked_samples(samples)
     if chosen is not None:
         if chosen.size != len(_DETAILS) or not np.isin(chosen, np.flatnonzero(shown)).all():
-            raise ParameterError(
-                f"samples are {chosen.tolist()}: give three that are certainly in contact and have standard deviations"
-            )
+            raise refused("samples", samples, "give three that are certainly in contact and have standard deviations")
         return chosen
     sweep = implied["constant_data"].to_dataset()["sweep"].values
     number, count = np.unique(sweep[shown], return_counts=True)
@@ -172,13 +168,6 @@ def _enlarged(shown: Any, implied: xr.DataTree, samples: Sequence[int] | None) -
         )
     of_sweep = np.flatnonzero(shown & (sweep == number[np.argmax(count)]))
     return of_sweep[np.linspace(0.1 * of_sweep.size, 0.9 * (of_sweep.size - 1), len(_DETAILS)).astype(int)]
-
-
-def _on_the_map(shown: Any, chosen: Any) -> list[int]:
-    """Return eighteen contacts, from the middles of equal parts, and those that are enlarged."""
-    every = np.flatnonzero(shown)
-    some = every[((np.arange(_ON_MAP) + 0.5) / _ON_MAP * every.size).astype(int)]
-    return [int(i) for i in np.union1d(some, chosen)]
 
 
 def _draw_detail(
@@ -210,16 +199,15 @@ def _draw_detail(
 def _draw_ratios(ax: Axes, implied: xr.DataTree, tight: xr.Dataset, loose: xr.Dataset, shown: Any) -> None:
     angle = np.degrees(implied["observed_data"].to_dataset()["drive_angle"].values)
     record = implied["constant_data"].to_dataset()
-    directions = record["direction"].values
-    for name, colour in (("tangent_sd", _ALONG), ("normal_sd", _ACROSS)):
+    sweeps, directions = record["sweep"].values, record["direction"].values
+    for words, name, colour in _RATIOS:
+        legend_entry(ax, words, color=colour, linewidth=1.3)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(shown, loose[name].values / tight[name].values, np.nan)
-        for sweep in np.unique(record["sweep"].values):
-            of_sweep = record["sweep"].values == sweep
-            style = SWEEP_LINES[str(directions[of_sweep][0])]
-            ax.plot(angle[of_sweep], ratio[of_sweep], color=colour, linestyle=style, linewidth=1.3)
-    for words, colour in (("along the contour", _ALONG), ("across it", _ACROSS)):
-        legend_entry(ax, words, color=colour, linewidth=1.3)
+        for sweep in np.unique(sweeps):
+            here = sweeps == sweep
+            style = SWEEP_LINES[str(directions[here][0])]
+            ax.plot(angle[here], ratio[here], color=colour, linestyle=style, linewidth=1.3)
     present = [direction for direction in SWEEP_LINES if direction in directions]
     for direction in present:
         legend_entry(ax, direction, color="0.4", linestyle=SWEEP_LINES[direction], linewidth=1.3)

@@ -1,4 +1,4 @@
-"""Families of contours side by side: probability and leave-one-out prediction."""
+"""Alternatives side by side: families of contours, and other assumptions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_panels, new_panels
+from tactile_bayes.plotting.axes import AxesArray, axes_for, check_dataset, check_panels, label_rows, new_panels
 from tactile_bayes.plotting.labels import number, show_numbers
 from tactile_bayes.plotting.legends import legend
 from tactile_bayes.plotting.marks import PALETTE
@@ -23,6 +23,9 @@ _FAR = -100.0  # difference beyond which the axis is logarithmic
 _LEGEND_BELOW = 34.0  # distance of the legend from the panel, with room for ticks and label [points]
 _WARNING = "#D55E00"
 _DOTS: dict[str, Any] = {"linestyle": "none", "markersize": 5.0, "zorder": 3}
+# Label, marker, and distance from the middle of the row.
+_REGIONS = {"in_gap": ("in the gap", "o", -0.12), "beside": ("beside it", "s", 0.12)}
+_TICKS = (0.0, 0.25, 0.5, 0.75, 1.0, 2.0, 5.0, *(10.0**k for k in range(1, 9)))
 
 
 def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
@@ -38,10 +41,6 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     axes : array_like of Axes, shape (2,), optional
         Axes for probabilities and elpd differences; shape (1,) if the comparison has no leave-one-out densities.
 
-    Returns
-    -------
-    ndarray of Axes, shape (2,) or (1,)
-
     Raises
     ------
     ParameterError
@@ -49,18 +48,11 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
 
     Examples
     --------
-    >>> found = xr.Dataset(
-    ...     {
-    ...         "probability": ("family", [0.9, 0.1]),
-    ...         "probability_by_width": (("prior_width", "family"), [[0.85, 0.15], [0.9, 0.1], [0.95, 0.05]]),
-    ...         "fits": ("family", [True, True]),
-    ...         "sampled": ("family", [True, True]),
-    ...         "converged": ("family", [True, True]),
-    ...     },
-    ...     coords={"family": ["circle", "ellipse"], "prior_width": [0.5, 1.0, 2.0]},
-    ...     attrs={"verdict": "circle with probability 0.9, ellipse with probability 0.1", "none_fits": 0},
-    ... )
-    >>> families(found).shape
+    >>> found = xr.Dataset({"probability": ("family", [0.9, 0.1])}, {"family": ["circle", "ellipse"]})
+    >>> found = found.assign(dict.fromkeys(("fits", "sampled", "converged"), ("family", [True, True])))
+    >>> by_width = [[0.85, 0.15], [0.9, 0.1], [0.95, 0.05]]
+    >>> found["probability_by_width"] = xr.DataArray(by_width, {"prior_width": [0.5, 1, 2]}, ("prior_width", "family"))
+    >>> families(found.assign_attrs(verdict="circle with probability 0.9, ellipse with probability 0.1")).shape
     (1,)
     """
     check_dataset(comparison, {"probability", "fits", "sampled"}, "comparison of families", "compare_families")
@@ -87,21 +79,19 @@ def _panels(comparison: xr.Dataset, axes: Any) -> AxesArray:
 def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
     from matplotlib.transforms import ScaledTranslation
 
-    probability = comparison["probability"].values
-    for place, share, fits, sampled in zip(
-        places, probability, comparison["fits"].values, comparison["sampled"].values, strict=True
-    ):
+    probability, sampled = comparison["probability"].values, comparison["sampled"].values
+    for place, share, fits, is_sampled in zip(places, probability, comparison["fits"].values, sampled, strict=True):
         style: dict[str, Any] = {"color": PALETTE["median"]}
         if not fits:
             style = {"facecolor": "0.9", "edgecolor": "0.55", "hatch": "////", "linewidth": 0.8}
         if np.isfinite(share):
             ax.barh(place, share, height=0.5, **style)
-            _write_share(ax, place, share, inside_colour="white" if fits else "black", sampled=bool(sampled))
+        if np.isfinite(share) and is_sampled:
+            _write_share(ax, place, share, inside_colour="white" if fits else "black")
     if np.isnan(probability).any():
         ax.text(0.5, 0.5, "no probabilities", transform=ax.transAxes, ha="center", va="center")
     else:
         for width, (marker, beside, label) in _WIDTHS.items():
-            sampled = comparison["sampled"].values
             shares = comparison["probability_by_width"].sel(prior_width=width).values
             style = {"marker": marker, "color": "black", "markerfacecolor": "white", "clip_on": False, **_DOTS}
             ax.plot(shares[sampled], places[sampled] + beside, label=label, **style)
@@ -122,14 +112,12 @@ def _family_label(family: xr.Dataset) -> str:
     name = str(family["family"].values)
     if not family["sampled"]:
         return f"{name}\nnot sampled: far off"
-    wrong = [] if family["fits"] else ["does not fit"]
-    wrong += [] if family["converged"] else ["not converged"]
-    return "\n".join((name, ", ".join(wrong))) if wrong else name
+    flags = {"does not fit": family["fits"], "not converged": family["converged"]}
+    wrong = ", ".join(words for words, is_good in flags.items() if not is_good)
+    return f"{name}\n{wrong}" if wrong else name
 
 
-def _write_share(ax: Axes, place: float, share: float, *, inside_colour: str, sampled: bool) -> None:
-    if not sampled:
-        return
+def _write_share(ax: Axes, place: float, share: float, *, inside_colour: str) -> None:
     words = "<0.001" if share < 1e-3 else ">0.999" if share > 0.999 else number(share, digits=2)
     style: dict[str, Any] = {"xytext": (8.0, 0.0), "ha": "left", "color": "black"}
     if share > 0.75:
@@ -171,3 +159,49 @@ def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:
     width = float(panels[0].figure.get_figwidth())
     wrapped = textwrap.fill(words, max(20, int(letters * width)), break_on_hyphens=False)
     panels[0].set_title(wrapped, loc="left", **style)
+
+
+def assumptions(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw how far each other assumption moves the median of a band, in widths of the band.
+
+    Within the grey half width the median stays in the band. Assumptions that the record rejects have open grey marks.
+
+    Parameters
+    ----------
+    found : xr.Dataset
+        From `tactile_bayes.trust`.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ParameterError
+        If the argument is not such a result, or assumptions were left out of it.
+
+    Examples
+    --------
+    >>> columns = {"moved_in_gap": [0.1, 2.0], "moved_beside": [0.05, 3.0], "fits": [1, 0]}
+    >>> found = xr.Dataset({name: ("assumption", values) for name, values in columns.items()})
+    >>> assumptions(found.assign_coords(assumption=["friction as stated", "family circle"])).get_xlabel()
+    'distance of the medians [widths of the band]'
+    """
+    check_dataset(found, {"moved_in_gap", "moved_beside", "fits"}, "result with assumptions", "trust")
+    count = found.sizes["assumption"]
+    ax = axes_for(ax, height=1.2 + 0.28 * count)
+    places, fits = np.arange(count, dtype=float), found["fits"].values.astype(bool)
+    ax.axvspan(0.0, 0.5, color="0.92", linewidth=0.0, zorder=0)
+    for region, (label, marker, beside) in _REGIONS.items():
+        moved = found[f"moved_{region}"].values
+        colour = PALETTE["tangential" if region == "in_gap" else "tip"]
+        ax.plot(moved[fits], places[fits] + beside, marker, color=colour, label=label, clip_on=False)
+        ax.plot(moved[~fits], places[~fits] + beside, marker, color="0.55", markerfacecolor="white")
+    ax.set_xscale("symlog", linthresh=1.0)
+    farthest = max(float(np.nanmax(found[f"moved_{region}"].values, initial=0.0)) for region in _REGIONS)
+    end = max(1.0, 1.3 * farthest)
+    ax.set_xlim(0.0, end)
+    ax.set_xticks([tick for tick in _TICKS if tick <= end])
+    show_numbers(ax.xaxis)
+    names = found["assumption"].values
+    label_rows(ax, [str(name) if ok else f"{name} (rejected)" for name, ok in zip(names, fits, strict=True)])
+    ax.set_xlabel("distance of the medians [widths of the band]")
+    legend(ax, loc="best")
+    return ax
