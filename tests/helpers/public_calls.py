@@ -36,16 +36,15 @@ SPECIFICATION = {
 }
 
 
-# Functions that begin what takes seconds, when all arguments have been checked, by their modules.
+# Functions that begin what takes seconds, when all arguments have been checked.
 _SLOW = (
-    ("inference.contour", "sampled"),
-    ("inference.point_load", "sample"),
-    ("inference.contact_posterior.posterior", "draw_contacts"),
-    ("comparison.families", "walk_of"),
-    ("calibration.calibrate", "replicate"),
-    ("calibration.calibrate", "make_replicate"),
-    ("assessment.trust", "sampling_error"),
-    ("report.writing", "page_of"),
+    *(
+        "inference.contour.sampled",
+        "inference.point_load.sample",
+        "inference.contact_posterior.posterior.draw_contacts",
+    ),
+    *("comparison.families.walk_of", "calibration.calibrate.replicate", "calibration.calibrate.make_replicate"),
+    *("assessment.trust.sampling_error", "report.writing.page_of"),
 )
 
 
@@ -59,7 +58,8 @@ def end_before_sampling(patch: pytest.MonkeyPatch) -> None:
     def reach(*args, **options):
         raise AcceptedError
 
-    for module, name in _SLOW:
+    for function in _SLOW:
+        module, _, name = function.rpartition(".")
         patch.setattr(importlib.import_module(f"tactile_bayes.{module}"), name, reach)
 
 
@@ -186,29 +186,19 @@ def compared() -> xr.Dataset:
 
 def trusted() -> xr.Dataset:
     """Assumptions that `trust` tried, made up."""
-    return xr.Dataset(
-        {
-            "moved_in_gap": ("assumption", [0.1, 2.0]),
-            "moved_beside": ("assumption", [0.05, 3.0]),
-            "fits": ("assumption", [1, 0]),
-        },
-        coords={"assumption": ["friction as stated", "family circle"]},
-    )
+    columns = {"moved_in_gap": [0.1, 2.0], "moved_beside": [0.05, 3.0], "fits": [1, 0]}
+    names = ["friction as stated", "family circle"]
+    return xr.Dataset({name: ("assumption", values) for name, values in columns.items()}, {"assumption": names})
 
 
 def calibrated() -> xr.Dataset:
     """A calibration, made up."""
-    return xr.Dataset(
-        {
-            "ranks": (("replicate", "quantity"), np.random.default_rng(1).integers(0, 100, (50, 2))),
-            "rank_p_value": ("quantity", [0.4, 0.8]),
-            "coverage": ("claim", [0.89, 0.93]),
-            "coverage_error": ("claim", [0.02, 0.018]),
-            "coverage_replicates": ("claim", [200, 198]),
-        },
-        coords={"quantity": ["a", "q"], "claim": ["pointwise_in_gap", "snap_off"]},
-        attrs={"level": 0.001, "probability": 0.9},
-    )
+    ranks = {"ranks": (("replicate", "quantity"), np.random.default_rng(1).integers(0, 100, (50, 2)))}
+    ranks["rank_p_value"] = "quantity", [0.4, 0.8]
+    shares = {"coverage": [0.89, 0.93], "coverage_error": [0.02, 0.018], "coverage_replicates": [200, 198]}
+    labels = {"quantity": ["a", "q"], "claim": ["pointwise_in_gap", "snap_off"]}
+    attrs = {"level": 0.001, "probability": 0.9}
+    return xr.Dataset(ranks | {name: ("claim", values) for name, values in shares.items()}, labels, attrs)
 
 
 CONTOURS = {
@@ -333,14 +323,10 @@ def _record_calls(folder: Path) -> dict[str, Call]:
     tb.datasets.generate(SPECIFICATION, folder / "data", workers=1)
     line = tb.contours.Polyline([[(-0.3, 0.6), (0.3, 0.6)]])
     overlay = tb.uncertainty.Overlay("line", line)
-    columns = ("sweep", "direction", "drive_angle", "holding_moment", "force_x")
+    names = ("sweep", "direction", "drive_angle", "holding_moment", "force_x")
+    table = {"columns": {name: measured()[name].values for name in names}, "attrs": {"rig": "1"}}
     return {
-        "make_record": right(
-            tb.make_record,
-            columns={name: measured()[name].values for name in columns},
-            rig=Rig(file={"missing": "force_y"}),
-            attrs={"rig": "1"},
-        ),
+        "make_record": right(tb.make_record, **table, rig=Rig(file={"missing": "force_y"})),
         "read_record": right(tb.read_record, path=file),
         "write_record": right(tb.write_record, record=ideal(), path=folder / "out.csv"),
         "read_points": right(tb.record.read_points, path=points),
@@ -370,21 +356,18 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
     streams().save(both)
     broken.write_text("no record", encoding="utf-8")
     rest = measured().isel(sample=slice(10, 15))
-    axial = np.linspace(0.2, 0.6, 20)
+    deflections = {"axial": np.linspace(0.2, 0.6, 20), "lateral": np.linspace(0.01, 0.05, 20)}
+    deflections["reading"] = np.linspace(0.1, 0.9, 20) ** 2
     several = {"families": ["parabola", "circle"], **STREAM}
     sampled = {"rig": STATED, "rng": 1, "settings": BRIEF}
+    unknown_lever = {"rig": STATED.with_unknown(lever="default")}
     comparison = tb.comparison.StreamComparison
     return {
         "infer_contour": right(tb.infer_contour, **sampled, measured=measured()),
         "infer_contours": right(
             tb.infer_contours, **sampled, records=[broken], out=folder / "many", probability=0.9, workers=1
         ),
-        "calibrate_rig": right(
-            tb.calibrate_rig,
-            **{**sampled, "rig": STATED.with_unknown(lever="default")},
-            records=measured(),
-            contour=PARABOLA,
-        ),
+        "calibrate_rig": right(tb.calibrate_rig, **sampled | unknown_lever, records=measured(), contour=PARABOLA),
         "Rig": right(tb.Rig, load_cell=CELL, unknown={"lever": 0.0}, file={}),
         "FileFormat": right(FileFormat, columns={"force_x": "Fx[mN]"}),
         "FileFormat.of": right(FileFormat.of, table={"force_x": "Fx[mN]"}),
@@ -398,14 +381,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         "Family.of": right(tb.Family.of, posterior=posterior()),
         "Family.only": right(tb.Family("circle").only, r=0.2),
         "infer_contacts": right(tb.infer_contacts, measured=measured(), rig=STATED, rng=1, draws=40),
-        "infer_point_load": right(
-            tb.infer_point_load,
-            axial=axial,
-            lateral=np.linspace(0.01, 0.05, 20),
-            reading=np.linspace(0.1, 0.9, 20) ** 2,
-            rng=1,
-            settings=BRIEF,
-        ),
+        "infer_point_load": right(tb.infer_point_load, **deflections, rng=1, settings=BRIEF),
         "compare_families": right(tb.compare_families, **sampled, measured=measured(), families=["parabola", "circle"]),
         "SamplerSettings": right(tb.SamplerSettings),
         "SamplerSettings.walkers_for": right(tb.SamplerSettings().walkers_for, parameters=4),
@@ -444,6 +420,8 @@ def _planning_calls() -> dict[str, Call]:
     p = tb.planning
     sweep = {"rig": STATED, "drive": COARSE}
     coarser = tb.Rotation(drive_step=0.2)
+    planned = {"band_widths": [0.01], "samples": 8, "parts": ["information", "required_noise"]}
+    mapped_over = {"contours": ["II"], "over": {"distance": [0.5], "noise_factor": [1.0]}, "replicates": 1}
     rods = {"lengths": [0.1], "diameters": [1e-3], "youngs_modulus": 1e9, "elastic_strain": 0.05}
     rest = {"drive_angles": measured().drive_angle[10:20].values, "x": [0.0, 0.1]}
     replicate = {"rig": STATED, "rng": 1, "settings": None, "drive": None, "truth": None}
@@ -453,32 +431,13 @@ def _planning_calls() -> dict[str, Call]:
         "Plan.reconstruct": right(plan().reconstruct, record=measured(), method="raw"),
         "Plan.with_noise": right(plan().with_noise, factor=2.0),
         "Plan.certain": right(plan().certain, record=ideal()),
-        "sensitivity": right(
-            tb.sensitivity,
-            **sweep,
-            contour=PARABOLA,
-            rng=1,
-            band_widths=[0.01],
-            probability=0.9,
-            samples=8,
-            parts=["information", "required_noise"],
-        ),
+        "sensitivity": right(tb.sensitivity, **sweep, **planned, contour=PARABOLA, rng=1, probability=0.9),
         "design": right(tb.design, known=posterior(), rng=1, drives=[coarser], draws=2),
         "Bands": right(Bands, probability=0.9, posterior_replicates=1),
         "Criterion": right(p.Criterion, probability=0.9),
         "usual_drives": right(p.usual_drives, known=posterior(), drive_step=0.1),
         "Workers": right(tb.tasks.Workers, where=1),
-        "error_map": right(
-            p.error_map,
-            contours=["II"],
-            rig=STATED,
-            rng=1,
-            over={"distance": [0.5], "noise_factor": [1.0]},
-            drive=coarser,
-            replicates=1,
-            bands=Bands(),
-            workers=1,
-        ),
+        "error_map": right(p.error_map, **mapped_over, rig=STATED, rng=1, drive=coarser, bands=Bands(), workers=1),
         "required_noise": right(p.required_noise, plan=plan(), band_width=0.01, probability=0.9),
         "required_rod": right(p.required_rod, plan=plan_si(), probability=0.9, **rods),
         "rest_of_sweep": right(

@@ -56,8 +56,13 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     (1,)
     """
     check_dataset(comparison, {"probability", "fits", "sampled"}, "comparison of families", "compare_families")
-    panels = _panels(comparison, axes)
-    places = np.arange(comparison.sizes["family"], dtype=float)
+    count, wanted = comparison.sizes["family"], 2 if "elpd_difference" in comparison else 1
+    if axes is None:
+        panels = new_panels(1, wanted, 1.9 + 0.48 * count, sharey=True)[0]
+    else:
+        others = " and elpd differences" if wanted == 2 else "; there are no leave-one-out densities"
+        panels = check_panels(axes, (wanted,), f"for probabilities{others}")
+    places = np.arange(count, dtype=float)
     _draw_probabilities(panels[0], comparison, places)
     if len(panels) == 2:
         _draw_differences(panels[1], comparison, places)
@@ -66,14 +71,6 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
         ax.spines[["top", "right"]].set_visible(False)
     _write_verdict(panels, comparison)
     return panels
-
-
-def _panels(comparison: xr.Dataset, axes: Any) -> AxesArray:
-    wanted = 2 if "elpd_difference" in comparison else 1
-    if axes is None:
-        return new_panels(1, wanted, 1.9 + 0.48 * comparison.sizes["family"], sharey=True)[0]
-    others = " and elpd differences" if wanted == 2 else "; there are no leave-one-out densities"
-    return check_panels(axes, (wanted,), f"for probabilities{others}")
 
 
 def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:

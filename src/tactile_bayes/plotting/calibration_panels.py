@@ -129,8 +129,8 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     names = {"coverage", "coverage_error", "coverage_replicates", "claim"}
     check_dataset(calibration, names, "calibration", "calibrate", ["probability"])
     is_shown = (calibration["coverage_replicates"].values >= _FEWEST) & np.isfinite(calibration["coverage"].values)
-    words = np.array([CLAIMS.get(str(name), str(name)) for name in calibration["claim"].values], dtype=object)
-    labels, left_out = words[is_shown].tolist(), words[~is_shown].tolist()
+    claims = np.array([CLAIMS.get(str(name), str(name)) for name in calibration["claim"].values], dtype=object)
+    labels, left_out = claims[is_shown].tolist(), claims[~is_shown].tolist()
     ax = axes_for(ax, height=1.4 + 0.36 * max(len(labels), 2))
     if not labels:
         return write_instead(ax, f"no claim was judged in {_FEWEST} replicates or more")
@@ -188,13 +188,15 @@ def _ranks(ranks: Any, quantity: xr.Dataset) -> _Ranks:
     name, p_value = str(quantity["quantity"].values), float(quantity["rank_p_value"])
     ranks = ranks[ranks >= 0]
     if not ranks.size:
-        return _Ranks(name, 0, p_value, *np.zeros((3, DRAWS + 1)))
+        nothing = np.zeros(DRAWS + 1)
+        return _Ranks(name, 0, p_value, nothing, nothing, nothing)
     shares = np.cumsum(np.bincount(ranks, minlength=DRAWS + 1))[:DRAWS] / ranks.size
     low, high = simultaneous_band(ranks.size, DRAWS, _BAND)
-    word = "leaves the band" if np.any((shares < low) | (shares > high)) else ""
+    leaves = np.any((shares < low) | (shares > high))
+    word = "not uniform" if p_value <= quantity.attrs["level"] else "leaves the band" if leaves else ""
     # At the last rank both distribution functions are 1.
-    curves = (np.append(each - expected_shares(DRAWS), 0.0) for each in (shares, low, high))
-    return _Ranks(name, ranks.size, p_value, *curves, "not uniform" if p_value <= quantity.attrs["level"] else word)
+    excess, low, high = (np.append(each - expected_shares(DRAWS), 0.0) for each in (shares, low, high))
+    return _Ranks(name, ranks.size, p_value, excess, low, high, word)
 
 
 def _draw_ranks(ax: Axes, drawn: _Ranks, usual: int) -> None:

@@ -99,8 +99,8 @@ def contour(
         label = "band" if probability is None else f"{percent(probability)} band"
         slack = 1e-9 * (high - low)
         band = band.isel(x=(band["x"].values >= low - slack) & (band["x"].values <= high + slack))
-        at, style = band["x"].values, {"color": PALETTE["band"], "linewidth": 0.5, "zorder": 1.5, "label": label}
-        ax.fill_between(at, band["lower"].values, band["upper"].values, **style)
+        at, lower, upper = (band[name].values for name in ("x", "lower", "upper"))
+        ax.fill_between(at, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5, label=label)
         if "median" in band:
             ax.plot(at, band["median"].values, color=PALETTE["median"], linewidth=1.0, label="median")
     if truth is not None:

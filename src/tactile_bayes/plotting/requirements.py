@@ -18,20 +18,16 @@ from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_WHERE = {"everywhere": "", "touched": " where it is touched", "gap": " in the gap"}
-
+_BANDS = {"touched": "where it is touched", "gap": "in the gap"}
 _REFUSED: dict[str, dict[str, Any]] = {
     "bent too far": {"facecolor": "none", "edgecolor": "white", "hatch": "////"},
     "touches little": {"facecolor": "none", "edgecolor": "white", "hatch": ".."},
     "does not reach": {"facecolor": "0.9", "edgecolor": "0.6", "hatch": "xx"},
     "cannot be swept": {"facecolor": "0.9", "edgecolor": "0.6", "hatch": ".."},
 }
-Quantity = Literal["across", "along", "touched", "gap"]
-
 _MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]
 _MOST_TICKS = 8
 _MOST_IN_LINE = 6  # largest number of legend entries in a row
-_BANDS = {"touched": "where it is touched", "gap": "in the gap"}
 
 
 def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> Axes:
@@ -173,8 +169,8 @@ def _label_bar(bar: Any, found: xr.Dataset, known: Floats) -> None:
 
 
 def _band_in_words(found: xr.Dataset) -> str:
-    where = _WHERE.get(str(found.attrs.get("where", "everywhere")), "")
-    return f"mean width of the {percent(found.attrs['probability'])} band{where}"
+    words = f"mean width of the {percent(found.attrs['probability'])} band"
+    return f"{words} {_BANDS.get(found.attrs.get('where'), '')}".rstrip()
 
 
 def _plain(attrs: Mapping[Any, Any], si: str) -> dict[str, str]:
@@ -185,7 +181,7 @@ def _plain(attrs: Mapping[Any, Any], si: str) -> dict[str, str]:
 def error_map(
     found: xr.Dataset,
     *,
-    quantity: Quantity = "across",
+    quantity: Literal["across", "along", "touched", "gap"] = "across",
     reconstruction: Literal["raw", "constrained"] = "constrained",
     ax: Axes | None = None,
 ) -> Axes:
@@ -265,7 +261,7 @@ def _drawn(found: xr.Dataset, quantity: str, reconstruction: str) -> tuple[xr.Da
     """Return what was observed and predicted, over contour, distance and noise_factor, its label and a title."""
     if quantity in _BANDS:
         both = found[f"posterior_{quantity}_width"], found[f"expected_{quantity}_width"]
-        label = f"mean width of the {percent(found.attrs['probability'])} band"
+        label = _band_in_words(found)
         title = f"bands {_BANDS[quantity]}" + (": filled markers are posteriors" if both[0].notnull().any() else "")
     else:
         of_method = found.sel(reconstruction=reconstruction)

@@ -72,7 +72,8 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
             drawn.append(deviation[is_shown])
             lines = ((~holds, 0.7, None), (holds, 1.8, f"{method}, {side} the contour"))
             for chosen, width, label in lines:
-                values = np.where(_joined(chosen), deviation, np.nan)
+                # The sample after a chosen one belongs to both lines, so that they meet.
+                values = np.where(chosen | np.append(False, chosen[:-1]), deviation, np.nan)
                 split = np.insert(angle, changes, angle[changes]), np.insert(values, changes, np.nan)
                 ax.plot(*split, style, color=colour, linewidth=width, label=label)
         low = row * _STRIP
@@ -236,11 +237,6 @@ def _mark_events(ax: Axes, first: float, last: float) -> None:
         place: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points"}
         place |= {"ha": "right", "xytext": (-3.0, 0.0)} if is_left else {"ha": "left", "xytext": (3.0, 0.0)}
         ax.annotate(words, (angle, 0.97), va="top", rotation=90.0, fontsize="small", color="0.3", **place)
-
-
-def _joined(chosen: np.ndarray) -> np.ndarray:
-    """Return the choice extended by each sample after a chosen one, so that thick and thin lines meet."""
-    return chosen | np.append(False, chosen[:-1])
 
 
 def _runs(chosen: np.ndarray, angle: Floats) -> list[tuple[float, float]]:

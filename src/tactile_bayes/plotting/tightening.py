@@ -86,7 +86,11 @@ def tightening(
     check_drawing(truth=truth)
     tight = contact_moments(implied)
     loose = single if isinstance(single, xr.Dataset) and "contact_x_sd" in single else contact_moments(single)
-    _refuse_another_record(implied, single, tight, loose)
+    if not {"observed_data", "constant_data"} <= set(getattr(implied, "children", ())):
+        raise ParameterError("implied is no tree of implied_contacts: give what it returned")
+    hashes = {tree.attrs["data_sha256"] for tree in (implied, single) if "data_sha256" in tree.attrs}
+    if len(hashes) > 1 or tight.sizes["sample"] != loose.sizes["sample"]:
+        raise ParameterError("implied and single contacts are not of one record: compute both from the same one")
     shown = _certain(tight) & _certain(loose)
     panels = _panels(axes)
     chosen = _enlarged(shown, implied, samples)
@@ -112,16 +116,6 @@ def tightening(
         ax.set_title(letter, fontsize="small", fontweight="bold", loc="left")
     _draw_ratios(panels[4], implied, tight, loose, shown)
     return panels
-
-
-def _refuse_another_record(
-    implied: xr.DataTree, single: xr.DataTree | xr.Dataset, tight: xr.Dataset, loose: xr.Dataset
-) -> None:
-    if not {"observed_data", "constant_data"} <= set(getattr(implied, "children", ())):
-        raise ParameterError("implied is no tree of implied_contacts: give what it returned")
-    hashes = {tree.attrs["data_sha256"] for tree in (implied, single) if "data_sha256" in tree.attrs}
-    if len(hashes) > 1 or tight.sizes["sample"] != loose.sizes["sample"]:
-        raise ParameterError("implied and single contacts are not of one record: compute both from the same one")
 
 
 def _certain(moments: xr.Dataset) -> Any:
