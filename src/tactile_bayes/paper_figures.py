@@ -15,17 +15,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import xarray as xr
 
+from tactile_bayes import checks
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import (
-    TINY,
-    check_function,
-    check_names,
-    check_number,
-    check_numbers,
-    check_optional,
-    check_path,
-    check_whole_number,
-)
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
@@ -182,16 +173,16 @@ def draw_all(
     ...     draw_all(folder, only=[3], formats=["svg"], distances=[0.5])[3]["svg"].name
     'figure_03.svg'
     """
-    wanted = list(dict.fromkeys(check_names("formats", formats)))
+    wanted = list(dict.fromkeys(checks.check_names("formats", formats)))
     absent = [name for name in wanted if name not in _FORMATS]
     if absent or not wanted:
         raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(_FORMATS)}")
     only = only.tolist() if isinstance(only, np.ndarray) else only
-    check_optional("only", only, Sequence, "give a list of numbers of figures")
+    checks.check_optional("only", only, Sequence, "give a list of numbers of figures")
     # Refuses before anything is written.
     captions = {number: caption(number, **options) for number in (NUMBERS if only is None else only)}
-    check_function("progress", progress)
-    folder = check_path("out", out, "give the path of a folder")
+    checks.check_function("progress", progress)
+    folder = checks.check_path("out", out, "give the path of a folder")
     files: dict[int, dict[str, Path]] = {}
     with own_style(style):
         for done, (number, text) in enumerate(captions.items(), start=1):
@@ -267,11 +258,11 @@ def _chosen(
     entry = _ENTRIES[number]
     given = entry.distances if distances is None else distances
     correction = "give rod lengths above 0, like [0.3, 0.5]"
-    q = check_numbers("distances", given, correction, shape=(None,), least=TINY)
-    rods = check_whole_number("rods", rods, 1, "give a whole number from 1 up, like 15")
+    q = checks.check_numbers("distances", given, correction, shape=(None,), least=checks.TINY)
+    rods = checks.check_whole_number("rods", rods, 1, "give a whole number from 1 up, like 15")
     inches = f"give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}"
-    width = check_number("width", width, inches, least=3.0, most=12.0)
-    check_optional("load_cell", load_cell, LoadCell, "give a LoadCell")
+    width = checks.check_number("width", width, inches, least=3.0, most=12.0)
+    checks.check_optional("load_cell", load_cell, LoadCell, "give a LoadCell")
     if load_cell is not None and rng is None:
         raise ParameterError("the load cell has noise: give rng, like rng=1")
     seed = None if rng is None else seed_sequence(rng)
@@ -390,11 +381,7 @@ _SHRUNK = 0.75  # size of the many event markers, over their usual size
 
 
 def _draw_observables(profile: Profile, choice: _Choice) -> Figure:
-    """Draw moment and forces along the drive: a colour for each distance, thin lines in tip contact.
-
-    Lines extend from first contact to snap-off, both included. Toward events, where loads may change with the square
-    root of the remaining angle, their points are denser than the drive's steps.
-    """
+    """Draw moment and forces from first contact to snap-off: a colour for each distance, thin lines in tip contact."""
     from matplotlib import colormaps
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator, MultipleLocator
@@ -427,7 +414,7 @@ def _draw_observables(profile: Profile, choice: _Choice) -> Figure:
 
 
 def _finer(made: Scan, number: int) -> xr.Dataset:
-    """Return samples of a sweep at the drive's steps and between events, denser toward these."""
+    """Return samples at the drive's steps and, denser, toward events, where loads change with the root of the angle."""
     events = made.sweeps[number]
     ends = np.array([event.drive_angle for event in (events.first_contact, *events.transitions, events.snap_off)])
     share = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, _BETWEEN) / _BETWEEN))

@@ -7,15 +7,7 @@ import numpy as np
 
 
 def by_number(function: Callable[..., Any], outputs: int) -> Callable[..., Any]:
-    """From arrays of shape (n,) to what the function makes of each entry, flat, shape (n, outputs).
-
-    Parameters
-    ----------
-    function : callable
-        Compiled; writes into rows of an array what it makes of the rows of another one.
-    outputs : int
-        How many numbers it makes of each.
-    """
+    """From arrays, shape (n,), to the rows, shape (n, outputs), that a compiled function makes of rows of arguments."""
 
     def of_arrays(*arguments):
         rows = np.stack(np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in arguments)), axis=-1)

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+import tactile_bayes as tb
 from helpers.friction_contact import Flexible, Stepper
 from helpers.friction_stepper import Drive, contour_of
 
+FAMILIES = {"circle": tb.contours.Circle, "ellipse": tb.contours.Ellipse, "parabola": tb.contours.Parabola}
 _BASE = 0.15  # least distance of the base from the object, over the object's size
 
 
@@ -67,3 +69,17 @@ def _drawn_contour(rng: np.random.Generator) -> dict[str, Any]:
     if family == "ellipse":
         return {"family": family, "a": float(rng.uniform(0.15, 0.6)), "b": float(rng.uniform(0.1, 0.5)), **place}
     return {"family": family, "a": float(rng.uniform(0.3, 1.5)), **place}
+
+
+def scanned(case):
+    """The package's scan of a case."""
+    rod, contour = case["rod"], dict(case["contour"])
+    curvature, known = rod.get("curvature", (0.0,)), {}
+    if any(curvature):
+        known["rest_curvature"] = lambda s: np.polynomial.polynomial.polyval(s, curvature)
+    x, y, angle = np.transpose(case["poses"])
+    return tb.scan(
+        FAMILIES[contour.pop("family")](**contour),
+        drive=tb.Motion(x, y, angle, drive_step=case["step"]),
+        rig=tb.Rig(rod=tb.Rod(taper=rod.get("taper", 0.0), **known), unknown={"friction": case["friction"]}),
+    )

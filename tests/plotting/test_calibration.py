@@ -25,22 +25,15 @@ LEVEL = 0.001
 def calibration_of(p_values=None, **ranks):
     """Ranks by quantity, and p values where they are not to be those of the ranks."""
     tested = [uniformity_p_value(r[r >= 0], DRAWS) if r.max() >= 0 else np.nan for r in ranks.values()]
-    return xr.Dataset(
-        {
-            "ranks": (("replicate", "quantity"), np.array(list(ranks.values())).T),
-            "rank_p_value": ("quantity", tested if p_values is None else p_values),
-        },
-        coords={"quantity": list(ranks)},
-        attrs={"level": LEVEL},
-    )
+    columns = {"ranks": (("quantity", "replicate"), list(ranks.values()))}
+    columns["rank_p_value"] = "quantity", tested if p_values is None else p_values
+    return xr.Dataset(columns, {"quantity": list(ranks)}, {"level": LEVEL})
 
 
 def covering(shares, errors, counts, probability=0.9, claims=None):
-    return xr.Dataset(
-        {"coverage": ("claim", shares), "coverage_error": ("claim", errors), "coverage_replicates": ("claim", counts)},
-        coords={"claim": list(CLAIMS)[: len(shares)] if claims is None else claims},
-        attrs={"probability": probability},
-    )
+    columns = {"coverage": shares, "coverage_error": errors, "coverage_replicates": counts}
+    labels = {"claim": list(CLAIMS)[: len(shares)] if claims is None else claims}
+    return xr.Dataset({k: ("claim", v) for k, v in columns.items()}, labels, {"probability": probability})
 
 
 def curve(ax):
@@ -169,17 +162,14 @@ def test_ranks_in_axes_given_have_labels_of_their_own_and_no_title():
     assert figure.get_suptitle() == ""
 
 
-@pytest.mark.parametrize(
-    ("calibration", "options", "named"),
-    [
-        (calibration_of(a=UNIFORM, q=LOW), {"axes": [None]}, ["axes", "(1,)", "(2,)"]),
-        (calibration_of(q=np.full(7, -1)), {}, ["7 replicates"]),
-        (calibration_of(q=UNIFORM).isel(quantity=[]), {}, ["100 replicates"]),
-    ],
-)
-def test_ranks_that_cannot_be_drawn_are_refused(calibration, options, named):
-    with refused(ParameterError, *named):
-        plotting.calibration_ranks(calibration, **options)
+def test_ranks_that_cannot_be_drawn_are_refused():
+    for calibration, options, *named in (
+        (calibration_of(a=UNIFORM, q=LOW), {"axes": [None]}, "axes", "(1,)", "(2,)"),
+        (calibration_of(q=np.full(7, -1)), {}, "7 replicates"),
+        (calibration_of(q=UNIFORM).isel(quantity=[]), {}, "100 replicates"),
+    ):
+        with refused(ParameterError, *named):
+            plotting.calibration_ranks(calibration, **options)
 
 
 # --- Coverage -------------------------------------------------------------------------------------------------------

@@ -147,13 +147,8 @@ def test_one_is_drawn_without_the_other(posterior, draw, group):
 
 def test_contours_of_the_posterior_are_drawn_over_those_of_the_prior(posterior):
     ax = plotting.posterior_contours(posterior, contours=3, truth=CONTOUR)
-    assert labels(ax) == [
-        "rod's reach",
-        "parabola, from the prior",
-        "parabola, from the posterior",
-        "true contour",
-        "pivot",
-    ]
+    parabolas = ["parabola, from the prior", "parabola, from the posterior"]
+    assert labels(ax) == ["rod's reach", *parabolas, "true contour", "pivot"]
     group, prior = posterior["posterior"].to_dataset(), posterior["prior"].to_dataset()
     colours = {"prior": "#E69F00", "posterior": plotting.PALETTE["median"]}
     for name, draws in (("prior", prior), ("posterior", group)):

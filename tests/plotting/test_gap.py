@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 
+from helpers.contour_posteriors import tree
 from helpers.pictures import labels, texts
 from tactile_bayes.contours import Parabola
 from tactile_bayes.plotting import gap as draw
@@ -13,21 +14,12 @@ TRUTH = Parabola(5.0, q=0.03)
 
 def posterior(left, right, share=0.01):
     """Draws about the true contour; the gap is from `left` to `right`, in metres."""
-    rng = np.random.default_rng(1)
-    dims, size = ("chain", "draw", "segment"), (2, 200)
-    parameters = {"a": 5.0, "q": 0.03, "x_c": 0.0}
-    noise = {"a": share * 5.0, "q": share * 1e-3, "x_c": share * 0.01}
+    rng, dims, size = np.random.default_rng(1), ("chain", "draw", "segment"), (2, 200)
+    spread = {"a": (5.0, share * 5.0), "q": (0.03, share * 1e-3), "x_c": (0.0, share * 0.01)}
     ends = {"snap_off_contact_x": (right, left), "first_contact_x": (0.09, -0.09), "snap_off_drive_angle": (3.2, -0.1)}
-    out = xr.DataTree.from_dict(
-        {
-            "posterior": xr.Dataset({k: (dims[:2], rng.normal(v, noise[k], size)) for k, v in parameters.items()}),
-            "events": xr.Dataset(
-                {k: (dims, rng.normal(v, 1e-4, (*size, 2))) for k, v in ends.items()},
-                coords={"segment": ["forward", "backward"]},
-            ),
-        }
-    )
-    out.attrs = {"family": "parabola", "units": "SI"}
+    out = tree("parabola", units="SI", **{name: rng.normal(*of, size) for name, of in spread.items()})
+    events = {name: (dims, rng.normal(pair, 1e-4, (*size, 2))) for name, pair in ends.items()}
+    out["events"] = xr.DataTree(xr.Dataset(events, {"segment": ["forward", "backward"]}))
     return out
 
 

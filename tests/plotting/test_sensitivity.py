@@ -23,13 +23,8 @@ def found():
 
 @pytest.fixture(scope="module")
 def in_si():
-    cell = LoadCell(force_noise=2e-5, moment_noise=1e-6)
-    return sensitivity(
-        rng=1,
-        rig=Rig(rod=ROD, load_cell=cell, unknown="nothing"),
-        drive=Rotation(drive_step=0.2),
-        parts=["information", "required_noise"],
-    )
+    rig = Rig(rod=ROD, load_cell=LoadCell(force_noise=2e-5, moment_noise=1e-6), unknown="nothing")
+    return sensitivity(rng=1, rig=rig, drive=Rotation(drive_step=0.2), parts=["required_noise"])
 
 
 @pytest.fixture(scope="module")
@@ -46,16 +41,11 @@ WIDTH = [[4e-4, 2e-4, 1e-4], [np.nan, 3e-4, np.nan]]
 
 def rods(status=STATUS, width=WIDTH, best=(0.1, 4e-4, 2e-4)):
     """Of 2 lengths and 3 diameters, with length, diameter and width of the best."""
-    metres = {"units": "m"}
-    return xr.Dataset(
-        {
-            "width": (("length", "diameter"), np.array(width, dtype=float), metres),
-            "status": (("length", "diameter"), status),
-            **{f"best_{name}": ((), v, metres) for name, v in zip(("length", "diameter", "width"), best, strict=True)},
-        },
-        coords={"length": ("length", [0.1, 0.2], metres), "diameter": ("diameter", [2e-4, 4e-4, 8e-4], metres)},
-        attrs={"probability": 0.95, "where": "gap"},
-    )
+    metres, dims = {"units": "m"}, ("length", "diameter")
+    columns = {"width": (dims, np.array(width, dtype=float), metres), "status": (dims, status)}
+    columns |= {f"best_{name}": ((), v, metres) for name, v in zip((*dims, "width"), best, strict=True)}
+    sizes = {"length": ("length", [0.1, 0.2], metres), "diameter": ("diameter", [2e-4, 4e-4, 8e-4], metres)}
+    return xr.Dataset(columns, sizes, {"probability": 0.95, "where": "gap"})
 
 
 def lines_of(ax, style, colour=None):

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from helpers.friction_cases import drawn_case
+from helpers.friction_cases import drawn_case, scanned
 from helpers.friction_contact import Flexible
-from helpers.friction_scans import scanned
 from helpers.friction_stepper import contour_of, step_through
 
 LOADS = ("holding_moment", "force_x", "force_y")

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import tactile_bayes as tb
-from helpers.friction_cases import drawn_case
-from helpers.friction_scans import scanned
+from helpers.friction_cases import drawn_case, scanned
 from helpers.friction_stepper import step_through
 from helpers.handed_out import violations
 from tactile_bayes.contours import Circle, Parabola

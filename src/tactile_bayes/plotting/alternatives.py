@@ -68,6 +68,7 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
         _draw_differences(panels[1], comparison, places)
     for ax in panels:
         ax.set_ylim(places[-1] + 0.6, places[0] - 0.6)
+        ax.tick_params(axis="y", length=0.0)
         ax.spines[["top", "right"]].set_visible(False)
     _write_verdict(panels, comparison)
     return panels
@@ -101,7 +102,6 @@ def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
     ax.set_yticks(places, labels)
     for tick, fits in zip(ax.yaxis.get_major_ticks(), comparison["fits"].values, strict=True):
         tick.label1.set_color("black" if fits else "0.4")
-    ax.tick_params(axis="y", length=0.0)
 
 
 def _family_label(family: xr.Dataset) -> str:
@@ -142,7 +142,6 @@ def _draw_differences(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
         ax.set_xlim(1.5 * least, 3.0)
         show_numbers(ax.xaxis)
     ax.set_xlabel("prediction of left-out samples:\nelpd difference ± standard error")
-    ax.tick_params(axis="y", length=0.0)
 
 
 def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:

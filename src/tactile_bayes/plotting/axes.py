@@ -70,10 +70,7 @@ def checked_samples(samples: Any) -> NDArray[np.intp] | None:
 
 
 def check_panels(axes: Any, shape: tuple[int, ...], meaning: str, *, lower: bool = False) -> AxesArray:
-    """Return the given Axes if they have the wanted shape, and refuse others; `meaning` describes the wanted ones.
-
-    With `lower` there may be None above the diagonal.
-    """
+    """Return the given Axes if they have the wanted shape; with `lower` there may be None above the diagonal."""
     from matplotlib.axes import Axes
 
     panels = np.atleast_1d(np.array(None if hasattr(axes, "data_vars") else axes, dtype=object))

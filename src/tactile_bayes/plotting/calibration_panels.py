@@ -90,9 +90,7 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
     usual = max(each.replicates for each in drawn)
     for ax, each in zip(panels, drawn, strict=True):
         _draw_ranks(ax, each, usual)
-        ax.set_xlim(0.0, 1.0)
-        ax.set_xticks([0.0, 0.5, 1.0], ["0", "0.5", "1"])
-        ax.set_ylim(-limit, limit)
+        ax.set(xlim=(0.0, 1.0), ylim=(-limit, limit), xticks=[0.0, 0.5, 1.0], xticklabels=["0", "0.5", "1"])
         ax.locator_params(axis="y", nbins=5)
         ax.tick_params(labelsize="small")
     return panels

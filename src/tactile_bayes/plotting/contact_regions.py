@@ -183,11 +183,9 @@ def _finished(ax: Axes, labelled: xr.Dataset, phase: Any, label: str, truth: Con
             legend_entry(ax, f"{label}, {words}", color=PALETTE[name], linewidth=1.0)
     ax.autoscale_view(tight=False)  # contour lines ask for tight limits
     if truth is not None:
-        low, high = ax.get_xlim()
-        bottom, top = ax.get_ylim()
-        ax.plot(*outline(truth, low, high), label="true contour", **TRUTH)
-        ax.set_xlim(low, high)
-        ax.set_ylim(bottom, top)
+        limits = {"xlim": ax.get_xlim(), "ylim": ax.get_ylim()}
+        ax.plot(*outline(truth, *limits["xlim"]), label="true contour", **TRUTH)
+        ax.set(**limits)
     finish_map(ax, labelled["contact_x"].attrs)
     if own:
         fit_height(ax)

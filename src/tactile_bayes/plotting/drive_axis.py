@@ -37,11 +37,7 @@ ENDINGS: Mapping[str, str] = {"release": "release", "never": "end of the drive"}
 
 @dataclass(frozen=True)
 class DriveAxis:
-    """Coordinate of every sample along the drive.
-
-    It is the drive angle where the drive turns in all sweeps, the travel of the base where it carries it in all, and
-    the number of the sample if there are sweeps of both kinds.
-    """
+    """Coordinate of samples: drive angle, travel if all sweeps carry the base, number of the sample if some do."""
 
     kind: Literal["angle", "travel", "sample"]
     values: Floats  # shape (samples,): degrees, lengths in the record's unit, or numbers of samples
@@ -100,10 +96,7 @@ def reading_style(direction: str, colour: str) -> dict[str, Any]:
 def draw_events(
     ax: Axes, events: SweepEvents, channel: str, frame: Frame, size: float = 1.0, *, travels: bool = False, **style: Any
 ) -> None:
-    """Mark first contact, phase changes and snap-off or release, with markers of `size` times their usual size.
-
-    They are marked at drive angles [degrees], or at travels of the base. A drive that ends in contact has neither.
-    """
+    """Mark first contact, phase changes and snap-off or release at drive angles [degrees], or at travels."""
     ending = ENDINGS.get(events.snap_off.kind, "snap-off")
     marked = {
         "first contact": (events.first_contact,),
@@ -121,10 +114,7 @@ def draw_events(
 def with_events(
     angle: Floats, value: Floats, phase: Phases, events: SweepEvents, channel: str, frame: Frame, travels: bool = False
 ) -> tuple[Floats, Floats, Phases]:
-    """Return the samples of a channel and its values at the events, in the order of the drive.
-
-    They are at drive angles [degrees], or at travels of the base.
-    """
+    """Return samples of a channel, and its values at the events, at drive angles [degrees] or travels, in order."""
     marked = [events.first_contact, *events.transitions, events.snap_off]
     following = [event.phase for event in marked[:-1]]
     angle = np.append(angle, [_place_of(event, travels) for event in marked])

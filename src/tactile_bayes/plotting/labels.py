@@ -13,14 +13,9 @@ from tactile_bayes.record import COLUMNS
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
-LABELS = {
-    "drive_angle": r"drive angle $\varphi_0$",
-    "holding_moment": "holding moment $m_0$",
-    "force_x": r"force $f_{\mathrm{A}x}$",
-    "force_y": r"force $f_{\mathrm{A}y}$",
-    "contact_x": "$x$",
-    "contact_y": "$y$",
-}
+LABELS = {"drive_angle": r"drive angle $\varphi_0$", "holding_moment": "holding moment $m_0$"}
+LABELS |= {"force_x": r"force $f_{\mathrm{A}x}$", "force_y": r"force $f_{\mathrm{A}y}$"}
+LABELS |= {"contact_x": "$x$", "contact_y": "$y$"}
 DRIVE_ANGLE = f"{LABELS['drive_angle']} [°]"
 _DIMENSIONLESS = {"length_unit": "$L$", "moment_unit": "$EI$/$L$", "force_unit": "$EI$/$L^2$"}
 # Ticks in a decade of a logarithmic axis, by the largest number of decades.
@@ -37,10 +32,7 @@ def set_unit(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values
 
 
 def set_log_scale(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values: Floats) -> None:
-    """Make an axis logarithmic, with limits around the positive values of a column and its unit in the label.
-
-    Unlike `set_unit` it leaves minor ticks without labels, which Matplotlib would write in another unit.
-    """
+    """Make an axis logarithmic, with limits around the positive values of a column and its unit in the label."""
     from matplotlib.ticker import LogFormatterMathtext, LogLocator, NullFormatter
 
     good = values[np.isfinite(values) & (values > 0.0)]
@@ -52,7 +44,7 @@ def set_log_scale(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], v
     axis.axes.set(**{f"{name_of_axis}scale": "log", f"{name_of_axis}lim": limits})
     decades = np.log10(high / low * margin**2)
     axis.set_major_locator(LogLocator(subs=next(ticks for most, ticks in _TICKS.items() if decades < most)))
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_formatter(NullFormatter())  # Matplotlib would write minor labels in another unit
     if power or low > 1e-4:
         show_numbers(axis, power)
     else:

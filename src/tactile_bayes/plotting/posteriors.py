@@ -72,8 +72,7 @@ def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = 
             right.stairs(density, edges, color=colour, linewidth=1.0, label=f"chain {chain}")
         left.margins(x=0.01)
         right.set_ylim(bottom=0.0)
-        right.set_yticks([])
-        right.set_xlim(_view(parameter))
+        right.set(yticks=[], xlim=_view(parameter))
         _label_parameter(left.yaxis, parameter, 4)
         _label_parameter(right.xaxis, parameter, 3, lines=False)
         if left is not grid[-1, 0]:

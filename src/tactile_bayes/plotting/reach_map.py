@@ -90,7 +90,7 @@ def posterior_contours(
     """Draw contours from the posterior over contours from the prior, to see what the record has added.
 
     Contours are paler beyond the rod's reach. If both look alike, the record is uninformative. A good posterior is a
-    single line on a map: `band_detail` enlarges it.
+    single line on a map: `band_detail` enlarges it. The example of `prior_contours` makes a tree to draw.
 
     Parameters
     ----------
@@ -106,16 +106,6 @@ def posterior_contours(
     ------
     ParameterError
         If the tree is not a posterior of a contour, or `contours` is not positive.
-
-    Examples
-    --------
-    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
-    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> posterior_contours(infer_contour(measured, rig=Rig(unknown="nothing"), rng=1, settings=quick)).get_ylabel()
-    '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of
     from tactile_bayes.uncertainty.band import contours_drawn
@@ -147,11 +137,7 @@ def _draw(
     touched: tuple[Floats, Floats] | None = None,
     entry_width: float = 1.5,
 ) -> Axes:
-    """Draw layers of contours, paler beyond the circles around the pivots, with median, truth and pivots over them.
-
-    A layer is a label, many contours, of which some are evenly picked, and a colour. The map extends over the rod's
-    reach and down to the lowest contour.
-    """
+    """Draw layers (label, many contours, colour) of contours, paler beyond the rod's reach, and lines over them."""
     from matplotlib.patches import Circle
 
     from tactile_bayes.uncertainty.band import length_unit

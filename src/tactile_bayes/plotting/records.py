@@ -12,7 +12,6 @@ from tactile_bayes.checks import check_kind, check_mapping
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
 from tactile_bayes.plotting.drive_axis import (
-    DriveAxis,
     draw_events,
     drive_axis,
     finish_channels,
@@ -28,6 +27,8 @@ from tactile_bayes.sweep import SweepEvents
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from tactile_bayes.plotting.drive_axis import DriveAxis
 
 # Colours of residuals of two overlapping sweeps, after Okabe and Ito.
 _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}

@@ -151,8 +151,7 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         handles += ax.plot(*best[:2], markersize=15.0, zorder=4, clip_on=False, label=label, **BEST)
     set_unit(ax.xaxis, "length of the rod ", "contact_x", found["length"].attrs, lengths)
     set_unit(ax.yaxis, "diameter of the rod ", "contact_y", found["diameter"].attrs, diameters)
-    ax.set_xlim(x[0], x[-1])
-    ax.set_ylim(y[0], y[-1])
+    ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
     legend_above(ax, 4, handles=handles)
     return ax
 
@@ -170,7 +169,7 @@ def _label_bar(bar: Any, found: xr.Dataset, known: Floats) -> None:
 
 def _band_in_words(found: xr.Dataset) -> str:
     words = f"mean width of the {percent(found.attrs['probability'])} band"
-    return f"{words} {_BANDS.get(found.attrs.get('where'), '')}".rstrip()
+    return f"{words} {_BANDS.get(str(found.attrs.get('where')), '')}".rstrip()
 
 
 def _plain(attrs: Mapping[Any, Any], si: str) -> dict[str, str]:

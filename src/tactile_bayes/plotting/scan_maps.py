@@ -12,20 +12,11 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_kind, check_whole_number, shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
+from tactile_bayes.plotting import maps
 from tactile_bayes.plotting.axes import axes_for
 from tactile_bayes.plotting.drive_axis import ENDINGS
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend_entry
-from tactile_bayes.plotting.maps import (
-    draw_gap,
-    draw_object,
-    draw_path,
-    draw_pivot,
-    finish_map,
-    limits_of,
-    outline,
-    write_on_top,
-)
 from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.sweep import Scan
@@ -83,11 +74,6 @@ def rods(
     >>> from tactile_bayes.contours import paper_profile
     >>> rods(scan(paper_profile("I", q=0.4)), direction="backward").get_xlabel()
     '$x$ [$L$]'
-
-    The third of four sweeps, forward from the second base:
-
-    >>> rods(scan(paper_profile("I", q=0.4), base=[(0, 0), (0.25, 0)]), sweep=2).get_xlabel()
-    '$x$ [$L$]'
     """
     check_kind("scan", scan, Scan, "give what scan returned")
     chosen_sweep = _number(scan, direction, sweep)
@@ -131,10 +117,10 @@ def rods(
     path = np.stack([record[f"base_{axis}"].values[of_sweep] for axis in "xy"])
     is_carried = bool(np.ptp(path, axis=1).any())
     if is_carried:
-        draw_path(ax, *path)
-    draw_pivot(ax, events.base, label="base at start" if is_carried else "pivot")
-    draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
-    finish_map(ax, record["base_x"].attrs)
+        maps.draw_path(ax, *path)
+    maps.draw_pivot(ax, events.base, label="base at start" if is_carried else "pivot")
+    maps.draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
+    maps.finish_map(ax, record["base_x"].attrs)
     return ax
 
 
@@ -168,11 +154,7 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.transforms import ScaledTranslation
 
-    if not isinstance(scan, Scan):
-        raise ParameterError(
-            f"touched draws what scan(...) returns, and not a {type(scan).__name__}: a record alone does not say what "
-            "was touched; plotting.observables draws it"
-        )
+    check_kind("scan", scan, Scan, "touched takes what scan(...) returned: give it; plotting.observables draws records")
     rod, attrs = rod_of(scan.record), scan.record["base_x"].attrs
     same = _SAME_PLACE * rod.length_unit
     ax = axes_for(ax)
@@ -191,31 +173,31 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     ends = {sweep.base: (sweep.snap_off.base_x, sweep.snap_off.base_y) for sweep in scan.sweeps}
     pivots = np.array([*lines, *ends.values()])
     x, y = (np.concatenate([*(arc[axis] for arc in arcs), pivots[:, axis]]) for axis in (0, 1))
-    draw_object(ax, scan.contour, x, y, room=0.05 * rod.length_unit)
-    power, unit = shown_unit("contact_x", attrs, limits_of(ax))
+    maps.draw_object(ax, scan.contour, x, y, room=0.05 * rod.length_unit)
+    power, unit = shown_unit("contact_x", attrs, maps.limits_of(ax))
     for base, style in lines.items():
         ax.plot(*zip(base, ends[base], strict=True), color=style["color"], linewidth=1.0, zorder=1.5)
-        draw_pivot(ax, base, colour=style["color"], label="")
+        maps.draw_pivot(ax, base, colour=style["color"], label="")
         place = ", ".join(number(part, power) for part in base)
         what = "base" if ends[base] == base else "base from"
         legend_entry(ax, f"{what} ({place}) {unit}", **style, marker="o", markerfacecolor="white")
 
     gaps = _gaps(arcs, same)
     texts = [
-        draw_gap(ax, left, right, f"gap\n{number(right - left, power, digits=3)} {unit}")
+        maps.draw_gap(ax, left, right, f"gap\n{number(right - left, power, digits=3)} {unit}")
         for left, right in sorted(gaps, key=lambda gap: gap[0] - gap[1])
     ]
     _keep_apart(ax, texts)
     if not gaps and len(arcs) > 1:
-        write_on_top(ax, 0.5 * sum(ax.get_xlim()), "no gap")
-    finish_map(ax, attrs)
+        maps.write_on_top(ax, 0.5 * sum(ax.get_xlim()), "no gap")
+    maps.finish_map(ax, attrs)
     return ax
 
 
 def _arc(contour: Contour, sweep: SweepEvents) -> tuple[Floats, Floats]:
     """Return points of the arc that a sweep touched, from left to right; its ends are the events' contacts."""
     left, right = sorted((sweep.first_contact, sweep.snap_off), key=lambda event: event.contact_x)
-    x, y = outline(contour, left.contact_x, right.contact_x)
+    x, y = maps.outline(contour, left.contact_x, right.contact_x)
     x[[0, -1]] = left.contact_x, right.contact_x
     y[[0, -1]] = left.contact_y, right.contact_y
     return x, y

@@ -18,19 +18,9 @@ Style = Literal["print", "screen"]
 COLUMN_WIDTH = 3.5  # width of a figure that fills one column of a journal [inches]
 # Width of a figure that fills both columns, or a page [inches]; the default of all functions of `plotting`.
 PAGE_WIDTH = 7.0
-_COMMON: Mapping[str, Any] = {
-    "font.family": ["sans-serif"],
-    "font.sans-serif": ["DejaVu Sans"],
-    "mathtext.fontset": "dejavusans",
-    "text.usetex": False,
-    "pdf.fonttype": 42,
-    "ps.fonttype": 42,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "tactile-bayes",
-    "savefig.bbox": None,
-    "savefig.facecolor": "white",
-}
-
+_COMMON: dict[str, Any] = {"font.family": ["sans-serif"], "font.sans-serif": ["DejaVu Sans"], "text.usetex": False}
+_COMMON |= {"mathtext.fontset": "dejavusans", "pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none"}
+_COMMON |= {"svg.hashsalt": "tactile-bayes", "savefig.bbox": None, "savefig.facecolor": "white"}
 _TICKS = {"major.width": 0.6, "minor.width": 0.4, "major.size": 3.0, "minor.size": 1.8}  # ticks of both axes, in print
 
 
@@ -39,20 +29,12 @@ def _letters(size: float, at_ticks: float) -> dict[str, float]:
     return dict.fromkeys(names, size) | dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), at_ticks)
 
 
+_PRINT = {f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.items()}
+_PRINT |= {"axes.linewidth": 0.6, "axes.labelpad": 3.0, "axes.titlepad": 4.0, "hatch.linewidth": 0.5}
+_PRINT |= {"legend.handlelength": 1.8, "legend.columnspacing": 1.4, "savefig.dpi": 300.0}
 # Settings of matplotlib by the name of the style.
 STYLES: Mapping[Style, Mapping[str, Any]] = {
-    "print": {
-        **_COMMON,
-        **_letters(8.0, 8.0),
-        **{f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.items()},
-        "axes.linewidth": 0.6,
-        "axes.labelpad": 3.0,
-        "axes.titlepad": 4.0,
-        "hatch.linewidth": 0.5,
-        "legend.handlelength": 1.8,
-        "legend.columnspacing": 1.4,
-        "savefig.dpi": 300.0,
-    },
+    "print": {**_COMMON, **_letters(8.0, 8.0), **_PRINT},
     "screen": {**_COMMON, **_letters(10.0, 9.0), "axes.linewidth": 0.8, "hatch.linewidth": 0.8, "savefig.dpi": 150.0},
 }
 

@@ -180,9 +180,7 @@ def _draw_detail(
     if truth is not None:
         along, height = outline(truth, x - 2.0 * reach, x + 2.0 * reach)
         ax.plot(along - x, height - y, **TRUTH)
-    ax.set_aspect("equal", adjustable="box")
-    ax.set_xlim(-reach, reach)
-    ax.set_ylim(-reach, reach)
+    ax.set(aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
     ax.locator_params(nbins=3)
     ax.tick_params(labelsize="small")
     for axis in (ax.xaxis, ax.yaxis):
