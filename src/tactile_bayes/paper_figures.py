@@ -174,8 +174,7 @@ def draw_all(
     'figure_03.svg'
     """
     wanted = list(dict.fromkeys(checks.check_names("formats", formats)))
-    absent = [name for name in wanted if name not in _FORMATS]
-    if absent or not wanted:
+    if not wanted or not set(wanted) <= set(_FORMATS):
         raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(_FORMATS)}")
     only = only.tolist() if isinstance(only, np.ndarray) else only
     checks.check_optional("only", only, Sequence, "give a list of numbers of figures")
@@ -448,7 +447,7 @@ def _draw_deformed_rods(profile: Profile, choice: _Choice) -> Figure:
 
     scans = {distance: choice.scan(profile, distance, _SWEEPS[profile]) for distance in choice.distances}
     sweeps = [(distance, made, number) for distance, made in scans.items() for number in range(len(made.sweeps))]
-    limits = _limits([(made, number) for _, made, number in sweeps])
+    limits = _limits(sweeps)
     figure, grid = choice.map_panels(len(sweeps), limits, beside=0.45, between=0.38, above=0.7, widest=3.6)
     columns = grid.shape[1]
     found: dict[str, Any] = {}
@@ -471,18 +470,16 @@ def _draw_deformed_rods(profile: Profile, choice: _Choice) -> Figure:
     return figure
 
 
-def _limits(sweeps: Sequence[tuple[Scan, int]]) -> Limits:
+def _limits(sweeps: Sequence[tuple[float, Scan, int]]) -> Limits:
     """Return limits in x and y that hold all rods of all sweeps, and the pivot."""
     corners = []
-    for made, number in sweeps:
+    for _, made, number in sweeps:
         events = made.sweeps[number]
         of_sweep = made.record["sweep"].values == number
         chosen = of_sweep & (made.record["truth_contact_phase"].values != "none")
         ends = [events.first_contact, *events.transitions, events.snap_off]
-        states = [
-            np.append(made.record[name].values[chosen], [getattr(event, name) for event in ends])
-            for name in ("drive_angle", *CHANNELS)
-        ]
+        names = ("drive_angle", *CHANNELS)
+        states = [np.append(made.record[name].values[chosen], [getattr(e, name) for e in ends]) for name in names]
         shapes = rod_shape(*states, side=1 if events.direction == "forward" else -1)
         corners.append([bound for shape in shapes for bound in (shape.min(), shape.max())])
     (left, _, bottom, _), (_, right, _, top) = np.min(corners, axis=0), np.max(corners, axis=0)

@@ -174,14 +174,8 @@ WRONG = {
     "force_y": ("N", "gf", "kg", "V"),
 }
 SIZES = {"drive_angle": np.pi / 180, "holding_moment": 1e-3, "force_x": 1e-3, "force_y": 1e-3}
-LINES_ABOVE = [
-    "# rodent: 7",
-    "# serial: 4711",
-    "# made on Monday, see log",
-    "# load_cell_model: ATI Nano17",
-    "#",
-    "# a = b",
-]
+LINES_ABOVE = ["# rodent: 7", "# serial: 4711", "# made on Monday, see log", "# load_cell_model: ATI Nano17"]
+LINES_ABOVE += ["#", "# a = b"]
 
 
 class WrittenTable:

@@ -17,6 +17,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+from helpers.data_sets import PLAIN, changed
 from helpers.faults import ERRORS, KILL, faulty, killed
 from tactile_bayes import datasets
 from tactile_bayes.cli.app import _message
@@ -57,13 +58,8 @@ def tree(k):
 
 
 def record(k):
-    columns = {
-        "sweep": 0,
-        "direction": "forward",
-        "drive_angle": [1.2, 1.3],
-        "force_x": [0.1, k],
-        "force_y": [0.2, 0.0],
-    }
+    forces = {"force_x": [0.1, k], "force_y": [0.2, 0.0]}
+    columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2, 1.3], **forces}
     return make_record(columns, Rig(file={"missing": ("holding_moment",)}))
 
 
@@ -115,12 +111,7 @@ COUNTS = {"redrawn": {}, "strained": 0, "untouched": 0}
 GENERATED = types.SimpleNamespace(index=np.arange(2), counts=COUNTS)
 STORED = Kind("numbers", InferenceError, lambda value: {"value": value}, lambda row: row["value"])
 STATE = first_random_state(np.random.SeedSequence(1))
-SPEC = {
-    "records": 4,
-    "seed": 1,
-    "shard_records": 2,
-    "contours": [{"family": "parabola", "a": {"uniform": [0.3, 3.0]}, "q": 0.5}],
-}
+SPEC = changed(PLAIN, records=4, shard_records=2)
 
 
 def write_states(folder, k):

@@ -79,17 +79,10 @@ def moments(points, weight, tangential):
     sd = np.sqrt(weight @ off**2)
     z = off / sd
     pairs = ((0, 1), (0, 2), (1, 2))
-    rho = np.array([weight @ (z[:, i] * z[:, j]) for i, j in pairs])
-    share = weight @ tangential
-    influence = [
-        off,
-        0.5 * (z**2 - 1.0),
-        np.stack(
-            [z[:, i] * z[:, j] - 0.5 * r * (z[:, i] ** 2 + z[:, j] ** 2) for (i, j), r in zip(pairs, rho, strict=True)],
-            axis=-1,
-        ),
-        (tangential - share)[:, None],
-    ]
+    first, second = (z[:, list(of)] for of in zip(*pairs, strict=True))
+    rho, share = weight @ (first * second), weight @ tangential
+    on_rho = first * second - 0.5 * rho * (first**2 + second**2)
+    influence = [off, 0.5 * (z**2 - 1.0), on_rho, (tangential - share)[:, None]]
     spread = np.sqrt(weight @ np.concatenate(influence, axis=1) ** 2)
     return np.concatenate([mean, np.log(sd), rho, [share]]), spread
 
@@ -240,14 +233,8 @@ def _summary(parts) -> Summary:
     parts = [tuple(column[weight > 1e-14] for column in (points, weight, lies)) for points, weight, lies in parts]
     numbers, spread = moments(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     each = np.array([moments(*part)[0] for part in parts])
-    return Summary(
-        numbers[:3],
-        np.exp(numbers[3:6]),
-        numbers[6:9],
-        numbers[9],
-        spread,
-        each.std(axis=0, ddof=1) / np.sqrt(len(parts)),
-    )
+    error = each.std(axis=0, ddof=1) / np.sqrt(len(parts))
+    return Summary(numbers[:3], np.exp(numbers[3:6]), numbers[6:9], numbers[9], spread, error)
 
 
 def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", friction=0.0) -> ContactDensity:

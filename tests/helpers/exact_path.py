@@ -335,14 +335,7 @@ class ExactPath:
         return ExactState(alpha + turned, *loads, arclength, tip, i, p, tuple(rod))
 
     def _solve(
-        self,
-        i: int,
-        tip: bool,
-        unknown: list[Number],
-        *,
-        parameter: Number | None = None,
-        angle: Number | None = None,
-        psi1: Number | None = None,
+        self, i: int, tip: bool, unknown: list[Number], *, parameter=None, angle=None, psi1=None
     ) -> list[Number]:
         """Newton's method for [parameter, θ0, ψ1], without those that are given, or that the phase does not have."""
 

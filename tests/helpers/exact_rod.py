@@ -73,12 +73,8 @@ def _rotate(u: Number, v: Number, beta: Number) -> tuple[Number, Number]:
 
 
 def _wrench(phi0: Number, moment: Number, root_f: Number, beta: Number) -> Outputs:
-    return {
-        "drive_angle": phi0,
-        "holding_moment": moment,
-        "force_x": -(root_f**2) * mp.sin(beta),
-        "force_y": root_f**2 * mp.cos(beta),
-    }
+    force_x, force_y = -(root_f**2) * mp.sin(beta), root_f**2 * mp.cos(beta)
+    return {"drive_angle": phi0, "holding_moment": moment, "force_x": force_x, "force_y": force_y}
 
 
 def contact(shape: Shape) -> tuple[float, float, float, float]:

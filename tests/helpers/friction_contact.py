@@ -114,13 +114,8 @@ class Flexible:
     def along(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Flexibility 1/B, its rate, rest curvature and its rate."""
         width = 1.0 / (1.0 - self.taper * s)
-        flexible = width**4
-        return (
-            flexible,
-            4.0 * self.taper * width * flexible,
-            _power_series(self.curvature, s),
-            _power_series(self.bend, s),
-        )
+        rate = 4.0 * self.taper * width**5
+        return width**4, rate, _power_series(self.curvature, s), _power_series(self.bend, s)
 
     def turn(self, s: Any) -> Any:
         """Turn of the unloaded rod from its base."""

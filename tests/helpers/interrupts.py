@@ -43,14 +43,8 @@ def interrupted_while_sampling(command, record, cwd, *, setup=""):
     """Exit code, stdout and stderr of a command that writes to run/, when Control-C is pressed while it samples."""
     (cwd / "rig.toml").write_text('unknown = "nothing"\n', encoding="utf-8")
     arguments = [command, record, "--rig", "rig.toml", "--out", "run", "-q"]
-    with subprocess.Popen(
-        [sys.executable, "-c", setup + SAMPLING, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        encoding="utf-8",
-        cwd=cwd,
-    ) as process:
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "encoding": "utf-8"}
+    with subprocess.Popen([sys.executable, "-c", setup + SAMPLING, *arguments], cwd=cwd, **streams) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "sampling\n"
         time.sleep(0.5)  # while walkers walk, which is most of the time

@@ -56,14 +56,8 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250) -> xr
         }
     )
     kept = {name: value for name, value in record.attrs.items() if name.startswith(("rod_", "load_cell_"))}
-    tree.attrs = {
-        "units": "dimensionless",
-        "family": "parabola",
-        "known": "{}",
-        "converged": 1,
-        "message": "converged",
-        **kept,
-    }
+    tree.attrs = {"units": "dimensionless", "family": "parabola", "known": "{}", "converged": 1, "message": "converged"}
+    tree.attrs |= kept
     return tree
 
 

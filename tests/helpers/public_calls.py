@@ -213,14 +213,8 @@ CONTOURS = {
     "from_points": tb.contours.from_points(np.linspace(-1, 1, 30), 0.5 + 0.5 * np.linspace(-1, 1, 30) ** 2),
 }
 # Methods of every contour, each with its argument.
-METHODS = {
-    "height": "x",
-    "locate": "parameter",
-    "parameter_of_slope": "slope_angle",
-    "parameter_of_x": "x",
-    "point": "slope_angle",
-    "radius_of_curvature": "slope_angle",
-}
+METHODS = {"height": "x", "locate": "parameter", "parameter_of_slope": "slope_angle", "parameter_of_x": "x"}
+METHODS |= {"point": "slope_angle", "radius_of_curvature": "slope_angle"}
 
 
 def _contour_calls() -> dict[str, Call]:

@@ -65,18 +65,12 @@ def held(
     contour, state, radius: float | None = None, *, curvature: Along = np.zeros_like, rigidity: Along = np.ones_like
 ) -> Held:
     """One state, a row of `equilibria` of a forward sweep; the radius is the contour's own if not given."""
-    alpha = float(state.slope_angle)
-    return Held(
-        float(state.drive_angle),
-        float(state.holding_moment),
-        float(np.hypot(state.force_x, state.force_y)),
-        alpha,
-        float(contour.radius_of_curvature(alpha)) if radius is None else radius,
-        float(state.contact_arclength),
-        str(state.contact_phase.values) == "tip",
-        curvature,
-        rigidity,
+    angle, moment, alpha, arclength = (
+        float(state[name]) for name in ("drive_angle", "holding_moment", "slope_angle", "contact_arclength")
     )
+    force, tip = float(np.hypot(state.force_x, state.force_y)), str(state.contact_phase.values) == "tip"
+    radius = float(contour.radius_of_curvature(alpha)) if radius is None else radius
+    return Held(angle, moment, force, alpha, radius, arclength, tip, curvature, rigidity)
 
 
 def shape(rod: Held, arclengths: Floats) -> Floats:

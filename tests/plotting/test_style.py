@@ -31,9 +31,6 @@ def test_settings_hold_inside_and_are_put_back_also_after_an_error(name):
         assert {key: mpl.rcParams[key] for key in STYLES[name]} == dict(STYLES[name])
         1 / 0  # noqa: B018
     assert dict(mpl.rcParams) == before
-    with style(name):
-        pass
-    assert dict(mpl.rcParams) == before
 
 
 @pytest.mark.parametrize("name", ["poster", "", None])

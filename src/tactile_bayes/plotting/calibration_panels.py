@@ -30,7 +30,6 @@ _BAND = 0.95
 _ROOM = 1.55  # limits of the panels over the largest value drawn, with room for text above and below
 _LETTERS = 82  # letters in a line of the heading
 _FEWEST = 2  # number of replicates below which a claim is left out
-_LETTERS_PER_INCH = 10.0  # letters per inch in the note on claims that are left out
 # Colour of a line, by the label of its panel.
 _COLOURS = {"": PALETTE["median"], "leaves the band": "#E69F00", "not uniform": "#D55E00"}
 
@@ -141,7 +140,7 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax.set_title(f"Coverage of statements with {percent(probability)} probability", loc="left", fontsize="medium")
     if left_out:
         words = f"left out, with fewer than {_FEWEST} replicates: {'; '.join(left_out)}"
-        wrapped = textwrap.fill(words, max(20, int(_LETTERS_PER_INCH * ax.figure.bbox.width / ax.figure.dpi)))
+        wrapped = textwrap.fill(words, max(20, int(10.0 * ax.figure.bbox.width / ax.figure.dpi)))  # letters in a line
         style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": "small", "color": "0.35"}
         ax.annotate(wrapped, (0.5, -0.4), xycoords=ax.xaxis.label, **style)
     return ax

@@ -57,10 +57,10 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     >>> from matplotlib.figure import Figure
     >>> from scipy import stats
-    >>> from tactile_bayes import Family
+    >>> from tactile_bayes import Family, Rotation
     >>> from tactile_bayes import design as design_of
     >>> known = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0, 0.05))
-    >>> found = design_of(known, bases=[(0.0, 0.0), (0.2, 0.0)], draws=2, rng=1)
+    >>> found = design_of(known, drives=[Rotation((0.0, 0.0)), Rotation((0.2, 0.0))], draws=2, rng=1)
     >>> design(found, ax=Figure().subplots()).get_xlabel()
     'position of the pivot $x$ [$L$]'
     """

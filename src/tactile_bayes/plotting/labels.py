@@ -63,7 +63,8 @@ def shown_unit(name: str, attrs: Mapping[Any, Any], values: Floats) -> tuple[int
     column = COLUMNS[name]
     if unit == "1":
         return 0, _DIMENSIONLESS[column.scale] if column.scale else ""
-    power = _power(values) if unit == column.unit else 0
+    largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values)) if unit == column.unit else 0.0
+    power = int(np.clip(3 * np.floor(np.log10(largest) / 3), -9, 0)) if largest > 0.0 else 0
     return power, f"{_PREFIXES[power]}{unit}"
 
 
@@ -75,8 +76,3 @@ def number(value: float, power: int = 0, *, digits: int = 6) -> str:
 def percent(share: float) -> str:
     """Return a share as text, in per cent."""
     return f"{100.0 * share:.6g} %"
-
-
-def _power(values: Floats) -> int:
-    largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
-    return int(np.clip(3 * np.floor(np.log10(largest) / 3), -9, 0)) if largest > 0.0 else 0

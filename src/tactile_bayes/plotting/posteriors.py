@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 _CHAINS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _MOST_DRAWS = 500
-_INTERVAL = 0.95
 _REGIONS = (0.95, 0.5)
 _ROWS = "rows are parameters"
 _TRUTH: dict[str, Any] = {"color": PALETTE["change"], "linestyle": "--", "linewidth": 0.9}
@@ -245,7 +244,7 @@ def _bins(draws: Floats, most: int) -> int:
 
 def _draw_marginal(ax: Axes, draws: Floats) -> None:
     density, edges = np.histogram(draws[np.isfinite(draws)], _bins(draws, 40), _core(draws))
-    ends = np.nanquantile(draws, [0.5 - 0.5 * _INTERVAL, 0.5 + 0.5 * _INTERVAL])
+    ends = np.nanquantile(draws, [0.025, 0.975])
     inner = np.concatenate([ends[:1], edges[(edges > ends[0]) & (edges < ends[1])], ends[1:]])
     height = density[np.clip(np.searchsorted(edges, inner[:-1], side="right") - 1, 0, density.size - 1)]
     ax.stairs(density, edges, fill=True, color=PALETTE["band"], alpha=0.45)
