@@ -102,10 +102,7 @@ def figure(
 
     Examples
     --------
-    >>> from tactile_bayes.plotting import style
-    >>> with style("print"):
-    ...     made = figure(3, distances=[0.3, 0.5])
-    >>> len(made.axes)
+    >>> len(figure(3, distances=[0.3, 0.5]).axes)
     3
     """
     entry, choice = _chosen(number, distances, drive_step, rods, load_cell, rng, width)
@@ -275,7 +272,6 @@ _WAY = {"tip": 0.6, "tangential": 0.45}  # position of the state shown between t
 _LIMITS: Limits = (-0.36, 1.02), (-0.24, 0.98)  # limits of both panels in x and y [L]
 _BESIDE = {"tip": 0.2, "tangential": 0.36}  # radius at which the slope angle is drawn: beyond the rod's end [L]
 _ARROW = 0.2  # length of the contact force; components of the reaction are in proportion to it [L]
-_CLEAR: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 _THIN: dict[str, Any] = {"color": "0.35", "linewidth": 0.7}
 _HEAD: dict[str, Any] = {"arrowstyle": "-|>", "color": PALETTE["change"], "linewidth": 1.2, "mutation_scale": 9.0}
 _HEAD |= {"shrinkA": 0.0, "shrinkB": 0.0}
@@ -352,7 +348,8 @@ def _draw_state(ax: Axes, made: Scan, state: dict[str, float], phase: str) -> No
     _draw_arrow(ax, arc[-4], arc[-1])
     _write(ax, "$m_0$", pivot, (0.0, -0.165), ha="center", va="center")
     if phase == "tangential":
-        _write(ax, "tip", (float(x[-1]), float(y[-1])), 0.02 * along, ha="left", va="center", bbox=_CLEAR)
+        clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+        _write(ax, "tip", (float(x[-1]), float(y[-1])), 0.02 * along, ha="left", va="center", bbox=clear)
     label_map(ax, {}, np.zeros(1))
 
 

@@ -84,7 +84,13 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
         )
     ranks = calibration["ranks"].transpose("quantity", "replicate").values
     drawn = [_ranks(of_one, calibration.isel(quantity=k)) for k, of_one in enumerate(ranks)]
-    panels = _new_panels(calibration, drawn) if axes is None else _panels_given(axes, len(drawn))
+    if axes is None:
+        panels = _new_panels(calibration, drawn)
+    else:
+        panels = check_panels(axes, (len(drawn),), "one for each quantity")
+        for ax in panels:
+            ax.set_xlabel(_across(), fontsize="small")
+            ax.set_ylabel("share up to there\n− expected share", fontsize="small")
     limit = _ROOM * max(float(np.max(np.abs([each.excess, each.low, each.high]))) for each in drawn)
     usual = max(each.replicates for each in drawn)
     for ax, each in zip(panels, drawn, strict=True):
@@ -144,14 +150,6 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": "small", "color": "0.35"}
         ax.annotate(wrapped, (0.5, -0.4), xycoords=ax.xaxis.label, **style)
     return ax
-
-
-def _panels_given(axes: Any, wanted: int) -> AxesArray:
-    panels = check_panels(axes, (wanted,), "one for each quantity")
-    for ax in panels:
-        ax.set_xlabel(_across(), fontsize="small")
-        ax.set_ylabel("share up to there\n− expected share", fontsize="small")
-    return panels
 
 
 def _new_panels(calibration: xr.Dataset, drawn: list[_Ranks]) -> AxesArray:

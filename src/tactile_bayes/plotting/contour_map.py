@@ -140,7 +140,6 @@ def band_detail(
 
     Examples
     --------
-    >>> import xarray as xr
     >>> flat = {"lower": ("x", [-1e-3, -2e-3]), "median": ("x", [0.0, 0.0]), "upper": ("x", [1e-3, 2e-3])}
     >>> band_detail(xr.Dataset(flat, coords={"x": [0.0, 1.0]})).get_ylabel()
     '$y$ − median [$L$]'

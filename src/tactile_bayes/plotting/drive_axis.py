@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 # Widths [degrees] between which an axis of angles has ticks at multiples of 15° or 30°.
 _SHORTEST, _LONGEST = 60.0, 400.0
 Phases = NDArray[np.object_]
-
 EVENT_MARKERS: Mapping[str, Mapping[str, Any]] = {
     "first contact": {"marker": "o", "markerfacecolor": "white", "markersize": 4.5},
     "phase change": {"marker": "D", "markersize": 4.0},

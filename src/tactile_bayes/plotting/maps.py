@@ -97,11 +97,6 @@ def draw_pivot(ax: Axes, base: tuple[float, float], *, colour: str = "black", la
     ax.plot(*base, linestyle="none", markeredgecolor=colour, zorder=5, label=label, **style)
 
 
-def draw_path(ax: Axes, x: Floats, y: Floats) -> None:
-    """Draw the path of a base that is carried."""
-    ax.plot(x, y, color="0.5", linestyle="-.", linewidth=0.8, zorder=1.5, label="base path")
-
-
 def draw_gap(ax: Axes, left: float, right: float, text: str, *, hatched: bool = True) -> Text:
     """Shade a stretch in x from bottom to top, and return its label."""
     style: dict[str, Any] = {"facecolor": PALETTE["gap"], "alpha": 0.25, "edgecolor": "0.5", "linewidth": 0.0}

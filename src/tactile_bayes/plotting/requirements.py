@@ -26,7 +26,6 @@ _REFUSED: dict[str, dict[str, Any]] = {
     "cannot be swept": {"facecolor": "0.9", "edgecolor": "0.6", "hatch": ".."},
 }
 _MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]
-_MOST_TICKS = 8
 _MOST_IN_LINE = 6  # largest number of legend entries in a row
 
 
@@ -246,7 +245,7 @@ def error_map(
     legend_entry(ax, "first order", color="0.35", linestyle="--", linewidth=1.3)
     set_log_scale(ax.yaxis, label, "contact_x", predicted.attrs, np.concatenate(drawn))
     set_log_scale(ax.xaxis, _noise_label(found), "sweep", {}, factor)
-    if factor.size <= _MOST_TICKS:
+    if factor.size <= 8:  # more ticks would run into one another
         ax.set_xticks(factor)
     entries = len(ax.get_legend_handles_labels()[1])
     legend_above(ax, entries if entries <= _MOST_IN_LINE else -(-entries // 2), title=title)

@@ -117,7 +117,7 @@ def rods(
     path = np.stack([record[f"base_{axis}"].values[of_sweep] for axis in "xy"])
     is_carried = bool(np.ptp(path, axis=1).any())
     if is_carried:
-        maps.draw_path(ax, *path)
+        ax.plot(*path, color="0.5", linestyle="-.", linewidth=0.8, zorder=1.5, label="base path")
     maps.draw_pivot(ax, events.base, label="base at start" if is_carried else "pivot")
     maps.draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
     maps.finish_map(ax, record["base_x"].attrs)

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 Style = Literal["print", "screen"]
 
 COLUMN_WIDTH = 3.5  # width of a figure that fills one column of a journal [inches]
-# Width of a figure that fills both columns, or a page [inches]; the default of all functions of `plotting`.
-PAGE_WIDTH = 7.0
+PAGE_WIDTH = 7.0  # width of a figure that fills both columns, or a page, and of figures by default [inches]
 _COMMON: dict[str, Any] = {"font.family": ["sans-serif"], "font.sans-serif": ["DejaVu Sans"], "text.usetex": False}
 _COMMON |= {"mathtext.fontset": "dejavusans", "pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none"}
 _COMMON |= {"svg.hashsalt": "tactile-bayes", "savefig.bbox": None, "savefig.facecolor": "white"}

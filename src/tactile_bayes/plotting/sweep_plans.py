@@ -132,8 +132,7 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     for direction in dict.fromkeys(map(str, known["direction"].values)):
         legend_entry(ax, direction, color="0.35", linestyle=SWEEP_LINES[direction], linewidth=1.3)
     ax.set_ylim(bottom=0.0)
-    ax.set_xlabel(DRIVE_ANGLE)
-    ax.set_ylabel("leverage of a reading")
+    ax.set(xlabel=DRIVE_ANGLE, ylabel="leverage of a reading")
     whole = number(float(known["leverage"].sum()), digits=3)
     title = f"leverage of all {known['leverage'].size:,} readings together: {whole}"
     legend_above(ax, 5, title=title, handlelength=1.6, columnspacing=1.3)
@@ -203,8 +202,7 @@ def noise_shares(
         ax.bar(angle[~is_answered], 1.0, wide, label="no result for some of the noise", **style)
     ax.set_xlim(angle.min() - 0.7 * wide, angle.max() + 0.7 * wide)
     ax.set_ylim(0.0, max(1.02, 1.02 * float(below.max(initial=0.0))))
-    ax.set_xlabel(f"{DRIVE_ANGLE}, {chosen['direction'].values[0]} sweep")
-    ax.set_ylabel("share of variance")
+    ax.set(xlabel=f"{DRIVE_ANGLE}, {chosen['direction'].values[0]} sweep", ylabel="share of variance")
     title = f"error of a {reconstruction} contact point {error} the contour, by the noise of"
     legend_above(ax, 4 if len(ax.containers) <= 4 else 3, title=title)
     return ax

@@ -206,7 +206,6 @@ def _draw_ratios(ax: Axes, implied: xr.DataTree, tight: xr.Dataset, loose: xr.Da
     ax.axhline(1.0, color="0.4", linewidth=0.8)
     ax.set_yscale("log")
     ax.yaxis.set_major_formatter("{x:g}")
-    ax.set_xlabel(DRIVE_ANGLE)
-    ax.set_ylabel("single sd / implied sd")
+    ax.set(xlabel=DRIVE_ANGLE, ylabel="single sd / implied sd")
     ax.grid(axis="y", color="0.9", linewidth=0.6)
     legend_above(ax, 2 + len(present))
