@@ -1,15 +1,35 @@
 """The figure of a design: a map of places where they form a grid, lines otherwise."""
 
+import itertools
+
 import matplotlib as mpl
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.collections import QuadMesh
 
-from helpers.designs import made_up
 from helpers.pictures import difference, labels
 from tactile_bayes.plotting import design
 
 XS, YS = (-0.3, -0.1, 0.1, 0.3), (-0.2, -0.1, 0.0)
+
+
+def made_up(xs, ys, *, steps=(0.05,), criterion="band", length=None, missing=(), pivots=()):
+    """Candidates on a grid, best at the second column of the last row; lengths in metres if a rod's is given."""
+    scale, unit = (1.0, {"units": "1"}) if length is None else (length, {"units": "m"})
+    rows = list(itertools.product(ys, xs, steps))
+    y, x, step = np.array(rows, dtype=float).T
+    width = 0.01 * scale * (1.0 + (x - xs[1]) ** 2 + (y - ys[-1]) ** 2 + step)
+    width[list(missing)] = np.nan
+    present = np.array(pivots, dtype=float).reshape(-1, 2).T
+    variables = {"best": ((), int(np.nanargmin(width))), "is_pivot": ("candidate", np.ones(step.size, dtype=bool))}
+    variables |= {f"base_{axis}": ("candidate", scale * at, unit) for axis, at in (("x", x), ("y", y))}
+    variables |= {f"present_base_{axis}": ("pivot", at, unit) for axis, at in zip("xy", present, strict=True)}
+    variables |= {"drive_step": ("candidate", step, {"units": "rad"}), "present_width": ((), 0.05 * scale, unit)}
+    criteria = {"width": (width, unit), "gap": (2.0 * width, unit), "information": (1.0 / width, {"units": "nat"})}
+    for name, (values, attrs) in criteria.items():
+        variables |= {name: ("candidate", values, attrs), f"{name}_error": ("candidate", 0.1 * values, attrs)}
+    return xr.Dataset(variables, attrs={"criterion": criterion, "probability": 0.95})
 
 
 def tiles(ax):

@@ -1,7 +1,8 @@
-"""The figures of families compared, and of what a prior expects: what they draw, and what they say."""
+"""The figures of families compared, of assumptions, and of what a prior expects: what they draw, and what they say."""
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from helpers.comparisons import made_up
 from helpers.pictures import labels, own_axes, row_labels, texts
@@ -99,6 +100,21 @@ def test_axes_that_do_not_fit_are_refused():
         plotting.families(made_up([0.5, 0.5]), axes=axes)
     with refused(ParameterError, "axes", "(2,)", "elpd"):
         plotting.families(made_up([0.5, 0.5], elpd=[0.0, -1.0]), axes=axes[0])
+
+
+# --- Assumptions ------------------------------------------------------------------------------------------------------
+
+
+def test_marks_lie_at_their_distances_and_rejected_ones_say_so():
+    columns = {"moved_in_gap": [0.1, 2.0, np.nan], "moved_beside": [0.05, 3.0, 0.2], "fits": [1, 0, 1]}
+    names = ["friction as stated", "family circle", "drift inferred"]
+    ax = plotting.assumptions(
+        xr.Dataset({name: ("assumption", of) for name, of in columns.items()}, {"assumption": names})
+    )
+    drawn = {line.get_label(): line.get_xdata() for line in ax.lines}
+    assert drawn["in the gap"][0] == 0.1
+    assert drawn["beside it"].tolist() == [0.05, 0.2]
+    assert row_labels(ax)[1] == "family circle (rejected)"
 
 
 # --- Contours from the prior ----------------------------------------------------------------------------------------
