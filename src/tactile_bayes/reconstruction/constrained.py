@@ -3,72 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.contacts.contact_coordinates import contact_states, contact_states_and_slopes
 from tactile_bayes.mechanics.contacts.fits import ContactFit
 from tactile_bayes.mechanics.fitting import fit_contacts
+from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.reconstruction.estimate import (
-    AMBIGUOUS,
-    BETWEEN_PHASES,
-    EITHER_PHASE,
-    NO_FIT,
-    NO_ZERO,
-    NONLINEAR,
-    OK,
+    MOST_BEND,
     RIVAL,
     Estimate,
-    bends_too_much,
+    Status,
     is_weak,
-    unanswered,
+    squared_distance,
+    status_by,
 )
 from tactile_bayes.reconstruction.samples import Samples
 
 _CLEARANCE = 2.0  # standard deviations from the edge between the phases below which the phase of a contact is uncertain
+_ROUNDING = 1e-9  # distance [L] that rounding makes
 _MISFIT = 25.0  # sum of squares of one degree of freedom that noise exceeds in less than one of a million samples
 
 
 def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     """Most likely contacts, with their covariance on the sheet of possible contacts."""
     _refuse_without_noise(samples)
-    count = delta.size
-    place, covariance = np.full((count, 4), np.nan), np.full((count, 4, 4), np.nan)
-    misfit, distance = np.full(count, np.nan), np.full(count, np.nan)
-    phase = np.zeros(count, dtype=np.int8)
-    other, status = np.full((count, 4), np.nan), unanswered(samples.loaded, samples.cut_off)
     with np.errstate(over="ignore"):
         usable = np.isfinite(samples.reading.loads**2).all(axis=1)
-    where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)
-    if where.size:
-        reading = samples.reading.take(where)
-        given = delta[where], samples.rods.take(where)
-        fit = fit_contacts(reading, *given)
-        rod, slopes = contact_states_and_slopes(fit.coordinates, *given)
-        found = np.isfinite(fit.misfit) & np.isfinite(rod.place).all(axis=0)
-        by = slopes.place
-        with np.errstate(over="ignore", invalid="ignore"):
-            spread = by @ fit.covariance @ np.swapaxes(by, 1, 2)
-        covariance[where] = np.where(found[:, None, None], spread, np.nan)
-        place[where] = np.where(found[:, None], rod.place.T, np.nan)
-        phase[where] = np.where(found, fit.phase, 0)
-        misfit[where], distance[where] = np.where(found, (fit.misfit, fit.clearance), np.nan)
-        bent = is_weak(reading.loads, reading.covariance)
-        with np.errstate(invalid="ignore"):
-            # Near the limits: the line of force through the pivot, or a vertical contour.
-            bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
-            bent |= np.abs(rod.place[2]) > 0.49 * np.pi
-        bent |= bends_too_much(place[where], covariance[where], _aside(fit, *given))
-        rivalled = found & (fit.rival < RIVAL)
-        twice = rivalled & (fit.other_phase == fit.phase)
-        kinds = (~found, fit.misfit > _MISFIT, twice, fit.clearance < _CLEARANCE, rivalled, bent)
-        status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AMBIGUOUS, BETWEEN_PHASES, EITHER_PHASE, NONLINEAR), OK)
-        has_other = rivalled & ((status[where] == AMBIGUOUS) | (status[where] == EITHER_PHASE))
-        other[where] = np.where(has_other[:, None], contact_states(fit.other, *given).place.T, np.nan)
-    return Estimate(place, covariance, phase, status, other, misfit, distance)
+    reasons = {Status.NO_CONTACT: ~samples.loaded, Status.CUT_OFF: samples.cut_off}
+    status = status_by({**reasons, Status.NO_ZERO_OF_CURVATURE: ~usable})
+    where = np.flatnonzero(status == Status.OK)
+    reading, given = samples.reading.take(where), (delta[where], samples.rods.take(where))
+    fit = fit_contacts(reading, *given)
+    rod, slopes = contact_states_and_slopes(fit.coordinates, *given)
+    place = rod.place.T
+    found = np.isfinite(fit.misfit) & np.isfinite(place).all(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        covariance = slopes.place @ fit.covariance @ np.swapaxes(slopes.place, 1, 2)
+        bent = is_weak(reading.loads, reading.covariance) | _bends_too_much(fit, place, covariance, *given)
+        # Near the limits: the line of force through the pivot, or a vertical contour.
+        bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
+        bent |= np.abs(place[:, 2]) > 0.49 * np.pi
+    rivalled = found & (fit.rival < RIVAL)
+    reasons = {
+        Status.NO_ZERO_OF_CURVATURE: ~found,
+        Status.DOES_NOT_FIT: fit.misfit > _MISFIT,
+        Status.AMBIGUOUS: rivalled & (fit.other_phase == fit.phase),
+        Status.BETWEEN_PHASES: fit.clearance < _CLEARANCE,
+        Status.EITHER_PHASE: rivalled,
+        Status.NONLINEAR: bent,
+    }
+    status[where] = status_by(reasons)
+    has_other = np.isin(status[where], (Status.AMBIGUOUS, Status.EITHER_PHASE))
+
+    def of_all(values: NDArray[Any], known: Flags = found, blank: float = np.nan) -> NDArray[Any]:
+        every = np.full((delta.size, *values.shape[1:]), blank, dtype=values.dtype)
+        every[where[known]] = values[known]
+        return every
+
+    return Estimate(
+        of_all(place),
+        of_all(covariance),
+        of_all(fit.phase, blank=NONE),
+        status,
+        of_all(contact_states(fit.other, *given).place.T, has_other),
+        of_all(fit.misfit),
+        of_all(fit.clearance),
+    )
 
 
 def are_weighed(samples: Samples) -> bool:
@@ -103,11 +110,12 @@ def principal_steps(covariance: Floats) -> Iterator[Floats]:
             yield scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
 
 
-def _aside(fit: ContactFit, delta: Floats, rods: Rods) -> list[tuple[Floats, Floats]]:
-    """Contacts one standard deviation aside, along the axes of the covariance."""
-    pairs = []
+def _bends_too_much(fit: ContactFit, place: Floats, covariance: Floats, delta: Floats, rods: Rods) -> Flags:
+    """Return where contacts one standard deviation aside contradict a covariance of first order, shape (n,)."""
+    bent = np.zeros(len(place), dtype=bool)
     for step in principal_steps(fit.covariance):
-        both = fit.coordinates + step, fit.coordinates - step
-        more, less = (contact_states(aside, delta, rods).place.T for aside in both)
-        pairs.append((more, less))
-    return pairs
+        more, less = (contact_states(fit.coordinates + sign * step, delta, rods).place.T for sign in (1.0, -1.0))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            x, y = (0.5 * (more + less) - place)[:, :2].T
+            bent |= ~((squared_distance(x, y, covariance) <= MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
+    return bent

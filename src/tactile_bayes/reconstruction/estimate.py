@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -9,25 +11,26 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats
 
-NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, BETWEEN_PHASES, EITHER_PHASE, NO_FIT, AMBIGUOUS = range(10)
 
-# Statuses of a sample, by code.
-STATUSES = (
-    "no contact",
-    "cut off",
-    "no zero of curvature",
-    "ok",
-    "nonlinear",
-    "beyond the tip",
-    "between phases",
-    "either phase",
-    "does not fit",
-    "ambiguous",
-)
+class Status(IntEnum):
+    """What became of a sample; `reconstruct` describes each."""
+
+    NO_CONTACT = 0
+    CUT_OFF = 1
+    NO_ZERO_OF_CURVATURE = 2
+    OK = 3
+    NONLINEAR = 4
+    BEYOND_THE_TIP = 5
+    BETWEEN_PHASES = 6
+    EITHER_PHASE = 7
+    DOES_NOT_FIT = 8
+    AMBIGUOUS = 9
+
+
+STATUSES = tuple(one.name.lower().replace("_", " ") for one in Status)  # by code
 MOST_BEND = 0.5  # shift by curvature, in standard deviations, above which a covariance of first order is not valid
 RIVAL = 6.0  # difference of sums of squares below which another contact is not negligible: a likelihood ratio of 20
 _WEAK = 10.0  # standard deviations of the noise below which a force is weak, so that its direction is uncertain
-_ROUNDING = 1e-9
 
 
 class Estimate(NamedTuple):
@@ -43,9 +46,9 @@ class Estimate(NamedTuple):
     edge_distance: Floats | None = None
 
 
-def unanswered(loaded: Flags, cut_off: Flags) -> NDArray[np.int8]:
-    """Status of samples before a contact is found."""
-    return np.where(loaded, np.where(cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
+def status_by(reasons: Mapping[Status, Flags]) -> NDArray[np.int8]:
+    """Return the status of samples: the first whose reason holds, OK without any."""
+    return np.select(list(reasons.values()), list(reasons), Status.OK).astype(np.int8)
 
 
 def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floats]:
@@ -71,16 +74,3 @@ def squared_distance(x: Floats, y: Floats, covariance: Floats) -> Floats:
     """Return the squared Mahalanobis distance of points in the plane, for covariances of shape (n, ≥ 2, ≥ 2)."""
     xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
     return np.asarray((yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy))
-
-
-def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> Flags:
-    """Return where contacts one standard deviation aside contradict a covariance of first order.
-
-    Shapes: place (n, 4), covariance (n, 4, 4), aside (n, ≥ 2) → (n,).
-    """
-    bent = np.zeros(len(place), dtype=bool)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for more, less in aside:
-            x, y = (0.5 * (more[:, axis] + less[:, axis]) - place[:, axis] for axis in (0, 1))
-            bent |= ~((squared_distance(x, y, covariance) <= MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
-    return bent

@@ -9,21 +9,17 @@ from tactile_bayes.mechanics.contacts.fits import RawFit
 from tactile_bayes.mechanics.fitting import raw_contacts
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.reconstruction.estimate import (
-    AMBIGUOUS,
-    BEYOND_TIP,
     MOST_BEND,
-    NONLINEAR,
-    OK,
     RIVAL,
     Estimate,
+    Status,
     is_weak,
     squared_distance,
-    unanswered,
+    status_by,
 )
 from tactile_bayes.reconstruction.samples import Samples
 
 _ROUNDING = 1e-9
-
 # Distance from which two points are different contacts, in standard deviations, or in L without noise.
 _APART = 2.0, 1e-6
 
@@ -33,9 +29,8 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
     fit = raw_contacts(samples.reading, delta, samples.rods, samples.has_noise)
     slope_angle, arclength = fit.place[:, 2:].T
     found = np.isfinite(arclength) & ~(samples.cut_off & samples.loaded)
-    status = unanswered(samples.loaded, samples.cut_off)
-    status[found] = OK
-    covariance = None
+    ambiguous = found & _is_ambiguous(fit, samples.has_noise)
+    covariance, bent = None, np.zeros(found.size, dtype=bool)
     with np.errstate(invalid="ignore"):
         # In tangential contact the rod lies along the contour, in tip contact it ends there: take the nearer case.
         turn = fit.tip_angle - slope_angle
@@ -43,15 +38,18 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
         if samples.has_noise:
             covariance = fit.covariance
             covariance[~found] = np.nan
-            status[
-                found & (is_weak(samples.reading.loads, samples.reading.covariance) | ~(fit.bend <= MOST_BEND**2))
-            ] = NONLINEAR
-        status[found & (arclength > 1.0 + _ROUNDING)] = BEYOND_TIP
-    ambiguous = found & _is_ambiguous(fit, samples.has_noise)
-    status[ambiguous] = AMBIGUOUS
+            bent = is_weak(samples.reading.loads, samples.reading.covariance) | ~(fit.bend <= MOST_BEND**2)
+    reasons = {
+        Status.NO_CONTACT: ~samples.loaded,
+        Status.CUT_OFF: samples.cut_off,
+        Status.NO_ZERO_OF_CURVATURE: ~found,
+        Status.AMBIGUOUS: ambiguous,
+        Status.BEYOND_THE_TIP: arclength > 1.0 + _ROUNDING,
+        Status.NONLINEAR: bent,
+    }
     fit.place[~found], fit.other[~ambiguous] = np.nan, np.nan
     phase = np.where(found, np.where(tip, TIP, TANGENTIAL), NONE).astype(np.int8)
-    return Estimate(fit.place, covariance, phase, status, fit.other)
+    return Estimate(fit.place, covariance, phase, status_by(reasons), fit.other)
 
 
 def _is_ambiguous(fit: RawFit, has_noise: bool) -> Flags:
