@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.diagnostics.result_check import doubtful_sides
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import contact_sides, doubtful_sweeps, reconstruct, with_sides
+from tactile_bayes.reconstruction import contact_sides, reconstruct, sides_and_doubts
 from tactile_bayes.rig import NOTHING, Rig, make_record
 from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.sweep import scan
@@ -36,7 +34,7 @@ def test_biases_do_not_turn_a_side(family, count):
         measured = simulate(experiment, np.random.default_rng([7, number])).measured
         forward = measured.direction.values == "forward"
         np.testing.assert_array_equal(contact_sides(measured, CELL) > 0.0, forward)
-        doubtful += bool(doubtful_sweeps(measured, CELL))
+        doubtful += bool(sides_and_doubts(measured, CELL)[1])
     assert doubtful <= 0.05 * count
 
 
@@ -46,7 +44,7 @@ def test_a_label_that_the_moment_contradicts_is_not_believed(bias):
     measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, rng=1)
     wrong = measured.assign(direction=("sample", np.full(measured.sizes["sample"], "backward")))
     assert np.all(contact_sides(wrong, CELL) == 1.0)
-    assert not doubtful_sweeps(wrong, CELL)
+    assert not sides_and_doubts(wrong, CELL)[1]
 
 
 @pytest.mark.parametrize("bias", [-2.0, -0.8, 0.8, 2.0])
@@ -55,7 +53,7 @@ def test_a_zero_before_and_after_contact_is_one_however_far_off(bias):
     record = scan(paper_profile("II", q=0.8), drive_angles=np.radians(np.arange(-30.0, 210.0, 2.0))).record
     measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, rng=1)
     np.testing.assert_array_equal(contact_sides(measured, CELL) > 0.0, measured.direction.values == "forward")
-    assert not doubtful_sweeps(measured, CELL)
+    assert not sides_and_doubts(measured, CELL)[1]
 
 
 def test_a_drive_that_turns_back_in_contact_stays_on_its_side():
@@ -96,7 +94,7 @@ def test_without_a_zero_the_prior_of_a_bias_decides():
     ):
         measured = in_contact_throughout(moment)
         assert np.all(contact_sides(measured, CELL) == (-1.0 if turned else 1.0))
-        assert bool(doubtful_sweeps(measured, CELL)) == doubted
+        assert bool(sides_and_doubts(measured, CELL)[1]) == doubted
 
 
 def test_step_2_takes_the_side_that_fits_and_says_so():
@@ -118,7 +116,7 @@ def test_in_doubt_evidence_decides_which_side_it_was():
     loaded = whole.isel(sample=np.flatnonzero(part.holding_moment.values > 0.0))
     moment = float(loaded.holding_moment.mean())
     shifted = loaded.assign(holding_moment=loaded.holding_moment - moment - 0.3)
-    assert doubtful_sweeps(shifted, CELL) == (0,)
+    assert sides_and_doubts(shifted, CELL)[1] == (0,)
     found = infer_contour(
         shifted,
         rig=Rig(load_cell=CELL, unknown={**NOTHING, "bias": "default", "moment_bias": stats.norm(0.0, 1.0)}),
@@ -129,9 +127,3 @@ def test_in_doubt_evidence_decides_which_side_it_was():
     assert found.attrs["sides_probability"] > 0.99
     assert "as a forward one" in doubtful_sides(found.attrs)[0]
     assert found["posterior"]["a"].median() == pytest.approx(0.5, abs=0.2)
-
-
-def test_a_side_that_is_none_is_refused():
-    record = scan(Parabola(0.5, 0.5), direction="forward").record
-    with refused(ParameterError, "'left'", "sweep 0"):
-        with_sides(record, {0: "left"})

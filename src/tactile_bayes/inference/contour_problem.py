@@ -19,7 +19,6 @@ from tactile_bayes.inference.record_likelihood.record_segments import without_er
 from tactile_bayes.inference.record_likelihood.shortening import is_long
 from tactile_bayes.reconstruction import (
     OTHER_SIDE,
-    doubtful_sweeps,
     loaded_samples,
     side_of,
     sides_and_doubts,
@@ -64,7 +63,7 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
         problem = _of_sides(replace(experiment, record=record))
     else:
         problem = _of_sides(experiment)
-        doubtful = doubtful_sweeps(without_errors(problem.model.measured, cell), cell)
+        _, doubtful = sides_and_doubts(without_errors(problem.model.measured, cell), cell)
     if not (doubtful := doubtful[:_MOST_DOUBTFUL]):
         return problem
     stated = {sweep: side_of(record, sweep) for sweep in doubtful}

@@ -15,7 +15,7 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
 from tactile_bayes.mechanics.elastica import lever_of_stem
 from tactile_bayes.mechanics.fitting import fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL
-from tactile_bayes.reconstruction.constrained import principal_steps
+from tactile_bayes.reconstruction.estimate import principal_steps
 from tactile_bayes.reconstruction.samples import Samples
 
 AXIAL_ALARM = 6.0  # size of the axial score above which the force along the rod is reported to disagree with the moment

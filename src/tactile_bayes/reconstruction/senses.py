@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.arrays import Flags, Index
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.fitting import fit_contacts, raw_contacts
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
-from tactile_bayes.reconstruction.estimate import Estimate
+from tactile_bayes.reconstruction.estimate import Estimate, are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.histories import least_turn, turned_sweeps
 from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.record import carried_sweeps
@@ -109,12 +108,3 @@ def of_any_sense(samples: Samples, friction: float) -> tuple[Samples, Estimate]:
     if found.covariance is not None:
         found.covariance[np.abs(samples.sense) < 1.0] = raw.covariance[np.abs(samples.sense) < 1.0]
     return samples, found
-
-
-def slopes_by_friction(estimate: Estimate, samples: Samples, friction: float) -> Floats:
-    """Return the ends of the slope angles that friction allows, dimensionless, shape (n, 2).
-
-    The force lies within the cone of friction about the contour's normal, at an edge of it if the rod slides.
-    """
-    slope, most = estimate.place[:, 2], np.where(samples.is_sure, 0.0, np.arctan(friction))
-    return np.stack([slope + (samples.sense - 1.0) * most, slope + (samples.sense + 1.0) * most], axis=1)

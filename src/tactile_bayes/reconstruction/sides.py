@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
 from tactile_bayes.numerics.scatter import rough_noise
@@ -43,30 +41,23 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     unloaded samples may have a constant load. A record may state the sides (`with_sides`).
     """
     sides, _ = sides_and_doubts(record, load_cell)
-    side = np.ones(record.sizes["sample"])
-    for sweep, named in sides.items():
-        if named == "backward":
-            side[record.sweep.values == sweep] = -1.0
-    return side
-
-
-def doubtful_sweeps(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[int, ...]:
-    """Sweeps whose moment contradicts their direction, but not significantly; the most doubtful first."""
-    return sides_and_doubts(record, load_cell)[1]
+    backward = [sweep for sweep, side in sides.items() if side == "backward"]
+    return np.where(record.sweep.isin(backward), -1.0, 1.0)
 
 
 def sides_and_doubts(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[dict[int, str], tuple[int, ...]]:
-    """Sides of all sweeps as in `contact_sides`, and `doubtful_sweeps`, in one computation."""
-    stated, sides, doubted = _stated(record), {}, []
+    """Return the sides of all sweeps as in `contact_sides`, and those whose moment contradicts their direction, but not
+    significantly, the most doubtful first."""
+    stated, sides, doubts = _stated(record), {}, dict[int, float]()
     sweeps = np.unique(record.sweep.values).tolist()
     if set(sweeps) <= stated.keys():
         return {sweep: stated[sweep] for sweep in sweeps}, ()
-    for one in _judged(record, load_cell):
-        said = str(record.direction.values[one.rows[0]])
-        sides[one.sweep] = stated.get(one.sweep, OTHER_SIDE[said] if one.is_contradicted else said)
-        if one.sweep not in stated and one.score < _DOUBTED and not one.is_contradicted:
-            doubted.append(one)
-    return sides, tuple(one.sweep for one in sorted(doubted, key=lambda one: one.score))
+    for sweep, score, is_contradicted in _judged(record, load_cell):
+        said = side_of(record, sweep)
+        sides[sweep] = stated.get(sweep, OTHER_SIDE[said] if is_contradicted else said)
+        if sweep not in stated and score < _DOUBTED and not is_contradicted:
+            doubts[sweep] = score
+    return sides, tuple(sorted(doubts, key=doubts.__getitem__))
 
 
 def side_of(record: xr.Dataset, sweep: int) -> str:
@@ -76,9 +67,6 @@ def side_of(record: xr.Dataset, sweep: int) -> str:
 
 def with_sides(record: xr.Dataset, sides: Mapping[int, str]) -> xr.Dataset:
     """State the sides of sweeps: "forward" for the side that a forward sweep touches, or "backward"."""
-    for sweep, side in sides.items():
-        if sweep not in record.sweep.values or side not in ("forward", "backward"):
-            raise ParameterError(f"there is no side {side!r} of sweep {sweep!r}: give sweeps, each forward or backward")
     every = {**_stated(record), **{int(sweep): side for sweep, side in sides.items()}}
     return record.assign_attrs({CONTACT_SIDES: json.dumps(every)})
 
@@ -87,47 +75,27 @@ def _stated(record: xr.Dataset) -> dict[int, str]:
     return {int(sweep): side for sweep, side in read_json(record.attrs.get(CONTACT_SIDES, "{}"), CONTACT_SIDES).items()}
 
 
-class _Judged(NamedTuple):
-    """Evidence of the moment of one sweep for its direction."""
-
-    sweep: int
-    rows: Index
-    score: float  # mean moment in contact less the zero, with the sign of the direction, in standard errors
-    absolute: float  # score for an unknown zero
-
-    @property
-    def is_contradicted(self) -> bool:
-        return self.score < _CONTRADICTED and self.absolute < -_UNLIKELY
-
-
-def _sign(record: xr.Dataset, rows: Index) -> float:
-    """Sign of the moment that the direction of a sweep implies."""
-    return -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
-
-
-def _are_plain(record: xr.Dataset, moment: Floats, parts: list[Index]) -> bool:
+def _are_plain(sign: Floats, moment: Floats, parts: list[Index]) -> bool:
     """Return whether no moment contradicts the direction of its sweep, and each sweep is exactly without load at either
     end."""
-    for rows in parts:
-        of_sweep = moment[rows]
-        if np.any(of_sweep[:FEWEST]) and np.any(of_sweep[-FEWEST:]):
-            return False
-        if (_sign(record, rows) * of_sweep).min() < 0.0:
-            return False
-    return True
+    ends = (moment[rows[:FEWEST]].any() and moment[rows[-FEWEST:]].any() for rows in parts)
+    return bool((sign * moment >= 0.0).all()) and not any(ends)
 
 
-def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
-    """Judge every sweep of a record, in the order of their numbers."""
+def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> Iterator[tuple[int, float, bool]]:
+    """Yield every sweep of a record, the mean moment in contact less the zero, with the sign of its direction, in
+    standard errors, and whether it contradicts the direction, for any likely zero."""
     unit = rod_of(record).moment_unit
     cell = load_cell or LoadCell()
     known = float(np.sqrt(cell.covariance(np.zeros((1, 3)))[0, 0, 0]))
     unknown = float(np.hypot(_ZERO * unit, cell.bias_uncertainty[0]))
     present = present_channels(record)
     sweep, moment = record.sweep.values, record.holding_moment.values
+    sign = np.where(record.direction.values == "backward", -1.0, 1.0)
     parts = rows_of_sweeps(sweep)
-    if CHANNELS[0] not in present or _are_plain(record, moment, parts):
-        return [_Judged(int(sweep[rows[0]]), rows, np.inf, np.inf) for rows in parts]
+    if CHANNELS[0] not in present or _are_plain(sign, moment, parts):
+        yield from ((int(sweep[rows[0]]), np.inf, False) for rows in parts)
+        return
     readings = np.stack([record[name].values for name in present], axis=-1)
     readings /= np.maximum(np.abs(readings).max(axis=0), 1e-100 * unit)  # squares of large ones would overflow
     floor = np.full(len(present), _ROUNDING**2)
@@ -138,16 +106,15 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
         loaded.append(rows[bounds.before : end] if bounds.found else rows)
         unloaded.append(np.concatenate([rows[: bounds.before], rows[end:]]))
         enclosed.append(bounds.found and min(bounds.before, bounds.after) >= FEWEST)
-    found, everywhere = [], np.concatenate(unloaded)
+    everywhere = np.concatenate(unloaded)
     for rows, inside, own, is_enclosed in zip(parts, loaded, unloaded, enclosed, strict=True):
         noise = max(rough_noise(moment[rows]), known, _ROUNDING * float(np.abs(moment[rows]).max()), 1e-100 * unit)
-        sign = _sign(record, rows)
 
-        def score(samples: Index, zero: float, error: float, noise: float = noise, sign: float = sign) -> float:
+        def score(samples: Index, zero: float, error: float, noise: float = noise) -> float:
             apart = moment[samples] - zero
             most = np.quantile(np.abs(apart), _ALL_BUT_OUTLIERS)
             error = float(np.hypot(error, noise * np.hypot(_WANDER, 1.0 / np.sqrt(samples.size))))
-            return float(sign * np.clip(apart, -most, most).mean() / error)
+            return float(sign[samples[0]] * np.clip(apart, -most, most).mean() / error)
 
         absolute = score(inside, 0.0, unknown)
         zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else everywhere]
@@ -156,5 +123,4 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
             relative = score(inside, zero, noise / np.sqrt(zeros.size))
         else:
             absolute = relative = score(rows, 0.0, unknown)
-        found.append(_Judged(int(sweep[rows[0]]), rows, relative, absolute))
-    return found
+        yield int(sweep[rows[0]]), relative, relative < _CONTRADICTED and absolute < -_UNLIKELY

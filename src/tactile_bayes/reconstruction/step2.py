@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import json
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 from scipy.special import chdtrc
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_choice, check_number, refused
+from tactile_bayes.checks import check_choice, refused
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.measurement import stated_entries
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
-from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction.axial_score import axial_score
-from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
-from tactile_bayes.reconstruction.raw import raw_estimate
+from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, raw_estimate, spread_across
 from tactile_bayes.reconstruction.samples import Samples, samples_of
-from tactile_bayes.reconstruction.senses import fits_better, of_any_sense, slopes_by_friction, with_likelier_senses
+from tactile_bayes.reconstruction.senses import fits_better, of_any_sense, with_likelier_senses
 from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
-from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 
@@ -47,8 +44,7 @@ def reconstruct(
     27). A rod that is not straight or not uniform may be bent both ways: then it is the first or the second such point,
     whichever is nearer to a contact, at the tip or with the rod along the contour. These are four numbers, and a
     contact has three degrees of freedom: the constrained method returns the most likely of the possible contacts, at
-    the tip (arc length 1) or along the rod. A bad sample does not affect the others; `status` describes the result of
-    each.
+    the tip (arc length 1) or along the rod. A bad sample does not affect the others.
 
     Parameters
     ----------
@@ -58,8 +54,8 @@ def reconstruct(
         Rod and load cell, by default those that the record states, with the deviations that are known: the record is
         first corrected for them, and for the data sheet's bias, gain and encoder offset. Friction is 0 unless it is
         known. A sample is loaded if its squared Mahalanobis distance from zero load is one that noise alone exceeds in
-        1 of 1000 samples; without any noise level every sample whose load is not exactly zero is loaded, and there are
-        no standard deviations. A turn of a compliant suspension by the error of the moment is neglected.
+        1 of 1000 samples, and without any noise level if its load is not exactly zero. A turn of a compliant suspension
+        by the error of the moment is neglected.
     method : {"raw", "constrained"}
         How a contact is determined from four noisy numbers.
 
@@ -72,28 +68,30 @@ def reconstruct(
         contact_xy_correlation, slope_angle_sd, contact_arclength_sd, and tangent_sd and normal_sd, along the contour
         and across it. They include errors that samples share, like an unknown bias, as if they were independent.
         other_contact_x, other_contact_y and other_contact_arclength are those of a second contact, where status is
-        "ambiguous" or "either phase", else NaN. least_slope_angle and greatest_slope_angle are the ends between which
-        friction leaves the slope, for the force as it is read: the rod may slide either way or stick where it is
-        carried, its drive turns back in contact, or it is curved toward the object. There the ends are two friction
-        angles apart, and by the raw method the slope angle is the one for sliding, the other way where that fits
-        clearly better, judged for each way of the drive. The constrained one takes the rod to stick where sliding is
-        off by more than two standard deviations and the force lies within the cone of friction: such a contact is that
-        of the raw method, with the slope of the rod. Elsewhere both ends are the slope angle.
+        "ambiguous" or "either phase", else NaN.
+
+        least_slope_angle and greatest_slope_angle are the ends between which friction leaves the slope, for the force
+        as it is read. They equal the slope angle, except where the rod may slide either way or stick: it is carried,
+        its drive turns back in contact, or it is curved toward the object. There the ends are two friction angles
+        apart, and by the raw method the slope angle is the one for sliding, the other way where that fits clearly
+        better, judged for each way of the drive. The constrained one takes the rod to stick where sliding is off by
+        more than two standard deviations and the force lies within the cone of friction: such a contact is that of the
+        raw method, with the slope of the rod.
 
         With method="constrained" also misfit, the residual sum of squared deviations in standard deviations, and
         edge_distance, the distance of the contact from the change between tip and tangential contact in standard
-        deviations. If the model holds, the misfit far from the edge follows χ² with one degree of freedom. Within some
-        2 standard deviations of the edge it does not: data between the two phases have two contacts nearby, which makes
-        the misfit smaller, and data beyond the corner have none, which makes it larger. In simulations 3 to 6 % of
-        misfits there exceed 3.84, instead of 5 %, and their mean is 0.8 to 1.1. The attributes misfit_sum,
-        misfit_samples and misfit_probability (the probability that noise gives at least this sum) leave out contacts
-        within 3 standard deviations; the probability is NaN if samples share errors. A value near 0 means that rod,
-        friction or frame are wrong or the noise is larger than stated; near 1, that it is smaller. In tangential
-        contact the force along the rod at the pivot follows from the moment, fAx cos φ0 + fAy sin φ0 = m0²/2 (− f sin δ
-        with the friction angle δ, − κ0 m0 with the rest curvature κ0). For rods that vary along their length the
-        difference is f (sin ψ1 + sin δ), with the angle ψ1 of the rod at the contact from the normal of the force by
-        Step 2. Its weighted mean over such samples, in standard errors, is axial_score: it is standard normal if the
-        model holds, and far below zero with unstated friction.
+        deviations. If the model holds, the misfit follows χ² with one degree of freedom, except within some 2 standard
+        deviations of the edge: data between the two phases have two contacts nearby, and data beyond the corner none.
+        (In simulations 3 to 6 % of misfits there exceed 3.84, instead of 5 %, and their mean is 0.8 to 1.1.) The
+        attributes misfit_sum, misfit_samples and misfit_probability (the probability that noise gives at least this
+        sum; NaN if samples share errors) leave out contacts within 3 standard deviations. A probability near 0 means
+        that rod, friction or frame are wrong or the noise is larger than stated; near 1, that it is smaller.
+
+        In tangential contact the force along the rod at the pivot follows from the moment, fAx cos φ0 + fAy sin φ0 =
+        m0²/2 (− f sin δ with the friction angle δ, − κ0 m0 with the rest curvature κ0). For rods that vary along their
+        length the difference is f (sin ψ1 + sin δ), with the angle ψ1 of the rod at the contact from the normal of the
+        force by Step 2. Its weighted mean over such samples, in standard errors, is the attribute axial_score: standard
+        normal if the model holds, and far below zero with unstated friction.
 
         status is one of
 
@@ -101,29 +99,28 @@ def reconstruct(
             A contact on the rod, with valid standard deviations if rod, noise and friction are as stated; the misfits,
             and not the status, show a wrong one.
         no contact
-            The sample is not loaded; the rest is NaN.
+            The sample is not loaded. Here and in the next two cases the rest is NaN.
         cut off
-            A channel is at the end of its range, so that the load was larger; the rest is NaN.
+            A channel is at the end of its range, so that the load was larger.
         no zero of curvature
-            The moment does not vanish at any point of the rod on the object's side, as it must at a contact; the rest
-            is NaN.
+            The moment does not vanish at any point of the rod on the object's side, as it must at a contact.
         nonlinear
-            A contact on the rod, but standard deviations and ellipses of first order are not valid: the force is below
-            10 standard deviations of its noise, or contacts one standard deviation aside deviate by half of one from
-            the ellipse. `infer_contacts` gives the whole posterior.
+            A contact on the rod, but standard deviations of first order are not valid: the force is below 10 standard
+            deviations of its noise, or contacts one standard deviation aside deviate by half of one from the ellipse.
+            `infer_contacts` gives the whole posterior, as in the other doubtful cases.
         beyond the tip
             The curvature vanishes only beyond the rod's end, at the point that is returned; under noise this happens to
             about half of the tip contacts. With method="raw" only.
         between phases
             Within 2 standard deviations of the change between tip and tangential contact: the phase is uncertain, and
-            standard deviations are not valid. `infer_contacts` weights both phases. With method="constrained" only.
+            standard deviations are not valid. With method="constrained" only.
         either phase
             Tip and tangential contact are both likely, at different points, the one returned at most 20 times as likely
-            as the other. `infer_contacts` weights them. With method="constrained" only.
+            as the other. With method="constrained" only.
         ambiguous
             The moment of a rod that is not straight or not uniform vanishes at two points, and a contact at either is
             likely, the one returned at most 20 times as likely as the other; without a noise level, neither is nearer
-            to a contact by more than a factor of 2.6. `infer_contacts` weights them.
+            to a contact by more than a factor of 2.6.
         does not fit
             No contact gives such loads: the misfit is above 25, which noise exceeds in less than one of a million
             samples. Check the rod and the noise. With method="constrained" only.
@@ -160,8 +157,6 @@ def reconstruct(
 def contacts_of(found: Corrected, method: Literal["raw", "constrained"]) -> xr.Dataset:
     """Return the contacts of a record of a valid rig; see `reconstruct`."""
     measured, cell, friction = found.record, found.load_cell, found.friction
-    most = float(np.tan(MAX_FRICTION_ANGLE))
-    check_number("friction", friction, f"give Coulomb's coefficient, from 0 to {most:.2f}", least=0.0, most=most)
     compliance = found.suspension_compliance
     if compliance * float(np.abs(np.nan_to_num(measured.holding_moment.values)).max()) > 2.0 * np.pi:
         correction = "with such moments the pivot would give way by more than a turn: give radians per moment"
@@ -225,65 +220,56 @@ def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:
     return cell.corrected(measured) if len(present_channels(measured)) == len(CHANNELS) else measured
 
 
-def _variables(
-    estimate: Estimate, samples: Samples, measured: xr.Dataset, friction: float
-) -> dict[str, tuple[str, object, object]]:
+def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset, friction: float) -> dict[str, Any]:
     """Columns of the result, in the laboratory frame and the record's units."""
-    rod, side = samples.rod, samples.side
-    place, other = (_in_lab_frame(one, side, rod.surface) for one in (estimate.place, estimate.other))
-    nothing = np.full(side.size, np.nan)
-    spread, tangent, normal, correlation = [nothing] * 4, nothing, nothing, nothing
+    rod, side, units = samples.rod, samples.side, measured.attrs["units"]
+    length, unit_of_length = rod.length_unit, COLUMNS["contact_x"].unit_in(units)
+    scales = {name: 1.0 if name == "slope_angle" else length for name in PLACE}
+    unit_of = {name: "rad" if name == "slope_angle" else unit_of_length for name in PLACE}
+    covariance = np.full((side.size, 4, 4), np.nan)
     if estimate.covariance is not None:
         covariance = _covariance_in_lab_frame(estimate.place, estimate.covariance, side, rod.surface)
-        spread = list(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T)
-        tangent, normal = spread_across(covariance, place[:, 2])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            correlation = covariance[:, 0, 1] / (spread[0] * spread[1])
-    length = rod.length_unit
-    contact, other_contact = (
-        {
-            "contact_x": measured.base_x.values + one[:, 0] * length,
-            "contact_y": measured.base_y.values + one[:, 1] * length,
-            "contact_arclength": one[:, 3] * length,
-        }
-        for one in (place, other)
-    )
-    columns = contact | {"slope_angle": place[:, 2]}
-    units = measured.attrs["units"]
-    unit_of_length = COLUMNS["contact_x"].unit_in(units)
-
-    def column(values: object, unit: str, long_name: str) -> tuple[str, object, object]:
-        return "sample", values, {"units": unit, "long_name": long_name}
-
-    variables: dict[str, tuple[str, object, object]] = {
-        name: ("sample", values, column_attributes(name, units)) for name, values in columns.items()
-    }
-    for name, values in other_contact.items():
-        variables[f"other_{name}"] = column(values, unit_of_length, f"{COLUMNS[name].long_name} of the other contact")
-    variables["contact_phase"] = column(np.array(PHASE_NAMES).take(estimate.phase), "1", "phase of the contact")
-    variables["status"] = column(np.array(STATUSES).take(estimate.status), "1", "what became of the sample")
-    for k, name in enumerate(PLACE):
-        unit, scale = ("rad", 1.0) if name == "slope_angle" else (unit_of_length, length)
-        variables[f"{name}_sd"] = column(
-            spread[k] * scale, unit, f"standard deviation of the {COLUMNS[name].long_name}"
-        )
-    for name, slopes in zip(("least", "greatest"), _slopes(estimate, samples, friction).T, strict=True):
-        variables[f"{name}_slope_angle"] = column(slopes, "rad", f"{name} slope angle that friction allows")
-    variables["contact_xy_correlation"] = column(correlation, "1", "correlation of contact_x and contact_y")
-    variables["tangent_sd"] = column(tangent * length, unit_of_length, "standard deviation along the contour")
-    variables["normal_sd"] = column(normal * length, unit_of_length, "standard deviation across the contour")
-    if estimate.misfit is not None and estimate.edge_distance is not None:
-        variables["misfit"] = column(estimate.misfit, "1", "sum of squared deviations")
-        variables["edge_distance"] = column(
-            estimate.edge_distance, "1", "standard deviations from the change of contact phase"
-        )
-    return variables
+    spread = dict(zip(PLACE, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T, strict=True))
+    place, other = (_in_lab_frame(one, side, rod.surface) for one in (estimate.place, estimate.other))
+    tangent, normal = spread_across(covariance, place[:, 2])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        correlation = covariance[:, 0, 1] / (spread["contact_x"] * spread["contact_y"])
+    pivots = np.stack([measured.base_x.values, measured.base_y.values], axis=1)
+    for one in (place, other):
+        one *= list(scales.values())
+        one[:, :2] += pivots
+    contact, other_contact = (dict(zip(PLACE, one.T, strict=True)) for one in (place, other))
+    long_names = {name: COLUMNS[name].long_name for name in PLACE}
+    points = ("contact_x", "contact_y", "contact_arclength")
+    slopes = zip(("least", "greatest"), _slope_ends(estimate, samples, friction), strict=True)
+    columns = [
+        *((name, contact[name], unit_of[name], long_names[name]) for name in (*points, "slope_angle")),
+        *((f"other_{n}", other_contact[n], unit_of_length, f"{long_names[n]} of the other contact") for n in points),
+        ("contact_phase", np.array(PHASE_NAMES)[estimate.phase], "1", "phase of the contact"),
+        ("status", np.array(STATUSES)[estimate.status], "1", "what became of the sample"),
+        *((f"{n}_sd", spread[n] * scales[n], unit_of[n], f"standard deviation of the {long_names[n]}") for n in PLACE),
+        *((f"{end}_slope_angle", of, "rad", f"{end} slope angle that friction allows") for end, of in slopes),
+        ("contact_xy_correlation", correlation, "1", "correlation of contact_x and contact_y"),
+        ("tangent_sd", tangent * length, unit_of_length, "standard deviation along the contour"),
+        ("normal_sd", normal * length, unit_of_length, "standard deviation across the contour"),
+    ]
+    if estimate.misfit is not None:
+        change = "standard deviations from the change of contact phase"
+        columns += [
+            ("misfit", estimate.misfit, "1", "sum of squared deviations"),
+            ("edge_distance", estimate.edge_distance, "1", change),
+        ]
+    return {name: ("sample", of, {"units": unit, "long_name": what}) for name, of, unit, what in columns}
 
 
-def _slopes(estimate: Estimate, samples: Samples, friction: float) -> Floats:
-    """Return the least and the greatest slope that friction allows in the laboratory frame, shape (n, 2)."""
-    slopes = samples.side[:, None] * (slopes_by_friction(estimate, samples, friction) - samples.rod.surface.half_angle)
-    return np.sort(slopes, axis=1)
+def _slope_ends(estimate: Estimate, samples: Samples, friction: float) -> Floats:
+    """Return the least and the greatest slope that friction allows in the laboratory frame, shape (2, n).
+
+    The force lies within the cone of friction about the contour's normal, at an edge of it if the rod slides.
+    """
+    slope, most = estimate.place[:, 2], np.where(samples.is_sure, 0.0, np.arctan(friction))
+    ends = np.stack([slope + (samples.sense + way) * most for way in (-1.0, 1.0)])
+    return np.sort(samples.side * (ends - samples.rod.surface.half_angle), axis=0)
 
 
 def _in_lab_frame(place: Floats, side: Floats, surface: Surface) -> Floats:
