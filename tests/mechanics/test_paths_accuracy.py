@@ -33,7 +33,7 @@ from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import equilibria, scan
-from tactile_bayes.sweep.path import sweep_paths
+from tactile_bayes.sweep.path import Acting, sweep_paths
 
 # Some of these objects are met again after snap-off, which is no concern of the path up to there.
 pytestmark = pytest.mark.filterwarnings("ignore::tactile_bayes.errors.ClearanceWarning")
@@ -255,7 +255,7 @@ def shot_at(scene, paths, angle, states, k):
 def test_against_shooting_with_friction(scene, friction, share):
     """The force is turned by arctan μ. What 1e-12 of drive angle changes is granted to the shots, as above."""
     try:
-        paths = sweep_paths(scene.contour, base=scene.base, direction=scene.direction, friction=friction)
+        paths = sweep_paths(scene.contour, base=scene.base, direction=scene.direction, acts=Acting(friction=friction))
     except ContourError:
         assume(False)
     first, snap = float(paths.first_angle[0]), float(paths.snap_angle[0])

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from helpers.profiled_rods import given_rods
-from tactile_bayes.contours import Circle, Parabola, paper_profile
+from tactile_bayes.contours import Circle, paper_profile
 from tactile_bayes.errors import ClearanceWarning, ContourError
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import equilibria, scan
 
@@ -71,23 +70,3 @@ def test_states_of_sweeps_once_the_contact_comes_back(name):
                 same, different = same + slopes.size - farthest - 1, different + farthest
     assert swept >= 8
     assert same > 10 * different
-
-
-@pytest.mark.parametrize("direction", ["forward", "backward"])
-def test_units_do_not_matter(direction):
-    """A rod of SI that is the dimensionless one in units of its own."""
-    length, rigidity = 0.08, 3e-5
-    one = Rod(rest_curvature=lambda s: 0.4 - 0.9 * s, taper=0.5)
-    si = Rod(length, rigidity, rest_curvature=lambda s: (0.4 - 0.9 * s / length) / length, taper=0.5)
-    contours = Parabola(0.5, 0.5, 0.1), Parabola(0.5 / length, 0.5 * length, 0.1 * length)
-    units = {"holding_moment": rigidity / length, "contact_arclength": length, "contact_x": length, "contact_y": length}
-    units |= dict.fromkeys(("force_x", "force_y"), rigidity / length**2) | dict.fromkeys(
-        ("drive_angle", "tip_angle"), 1
-    )
-    slopes = (1.0 if direction == "forward" else -1.0) * np.linspace(0.0, 0.8, 9)
-    bare, of_si = (
-        equilibria(c, slopes, direction=direction, rig=Rig(rod=r)) for c, r in zip(contours, (one, si), strict=True)
-    )
-    np.testing.assert_array_equal(of_si.contact_phase, bare.contact_phase)
-    for column, unit in units.items():
-        np.testing.assert_allclose(of_si[column] / unit, bare[column], atol=1e-10)

@@ -158,6 +158,11 @@ def test_profile_two_lets_go_at_the_corner():
     assert np.all(beyond.drive_angle < truth.drive_angle)
 
 
+def height_over(x, y, alpha):
+    """Of a point over the line from the pivot at an angle."""
+    return y * np.cos(alpha) - x * np.sin(alpha)
+
+
 @pytest.mark.parametrize("name", ["I", "II", "III", "IV"])
 @pytest.mark.parametrize("q", [0.2, 0.4, 0.6])
 @pytest.mark.parametrize("base", [(0.0, 0.0), (0.2, -0.1)])
@@ -175,15 +180,9 @@ def test_phase_changes_and_first_contact_by_bisection(name, q, base):
         x, y, _ = relative(slope)
         if first.kind == "tip":
             truth = brentq(lambda a: np.hypot(*relative(a)[:2]) - 1, slope - 1e-3, slope + 1e-3, xtol=1e-15)
-            # The tangent from the pivot touches only beyond the rod.
-            assert y * np.cos(slope) - x * np.sin(slope) > 0
+            assert height_over(x, y, slope) > 0  # the tangent from the pivot touches only beyond the rod
         else:
-            truth = brentq(
-                lambda a: relative(a)[1] * np.cos(a) - relative(a)[0] * np.sin(a),
-                slope - 1e-3,
-                slope + 1e-3,
-                xtol=1e-15,
-            )
+            truth = brentq(lambda a: height_over(*relative(a)), slope - 1e-3, slope + 1e-3, xtol=1e-15)
             assert np.hypot(x, y) <= 1
         assert slope == pytest.approx(truth, abs=1e-10)
         bearing = np.arctan2(y, x)

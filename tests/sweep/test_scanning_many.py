@@ -82,7 +82,7 @@ def test_what_cannot_be_swept_says_why():
 @pytest.mark.parametrize(
     ("arguments", "options", "named"),
     [
-        ((Parabola(np.ones(2), 0.5), np.degrees(ANGLES)), {}, ["2π", 206.265, "np.radians"]),
+        ((Parabola(np.ones(2), 0.5), np.degrees(ANGLES)), {}, ["drive_angles", "2π", "np.radians"]),
         (([Parabola(0.5, 0.5)] * 2, ANGLES), {}, ["contours", "list"]),
         ((Parabola(0.5, 0.5), ANGLES), {}, ["(n,)", "()", "scan"]),
         ((Parabola(np.ones(2), 0.5), ANGLES), {"direction": "up"}, ["direction", "'up'"]),

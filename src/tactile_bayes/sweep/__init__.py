@@ -1,6 +1,6 @@
 """Step 1: the readings of a sweep along a contour, or states at slope angles, with events, labels and units."""
 
-from tactile_bayes.sweep.columns import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
+from tactile_bayes.sweep.columns import ManyUnits, to_lab_frame
 from tactile_bayes.sweep.drive import (
     Carried,
     Direction,
@@ -12,14 +12,11 @@ from tactile_bayes.sweep.drive import (
     recorded_drives,
 )
 from tactile_bayes.sweep.events import Event, SweepEvents
-from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.scanning import Scan, equilibria, scan
 from tactile_bayes.sweep.scanning_many import scan_many
 from tactile_bayes.sweep.template import blind_angles, record_template
 
 __all__ = [
-    "EVENT_COLUMNS",
-    "SAMPLE_COLUMNS",
     "Carried",
     "Direction",
     "Drive",
@@ -33,12 +30,9 @@ __all__ = [
     "blind_angles",
     "drives_of",
     "equilibria",
-    "phases_of",
     "record_template",
     "recorded_drives",
     "scan",
     "scan_many",
-    "sweep_events",
-    "sweep_samples",
     "to_lab_frame",
 ]

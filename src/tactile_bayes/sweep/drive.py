@@ -14,15 +14,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import (
-    as_numbers,
-    check_array,
-    check_choice,
-    check_number,
-    check_numbers,
-    check_positive,
-    refused,
-)
+from tactile_bayes.checks import check_array, check_choice, check_number, check_numbers, check_positive, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import carried_sweeps
 
@@ -81,7 +73,10 @@ class Rotation:
             step = check_number("drive_step", self.drive_step, correction, least=_FINEST, most=_COARSEST)
             object.__setattr__(self, "drive_step", step)
         if self.drive_angles is not None:
-            object.__setattr__(self, "drive_angles", tuple(_angles(self.drive_angles).tolist()))
+            angles = check_numbers("drive_angles", self.drive_angles, _IN_DEGREES, least=-_TURN, most=_TURN)
+            if angles.ndim > 1 or not angles.size:
+                raise refused("drive_angles", self.drive_angles, "give a list of angles in radians")
+            object.__setattr__(self, "drive_angles", tuple(np.unique(angles).tolist()))
             if self.drive_step is not None:
                 raise ParameterError("drive_step and drive_angles are two grids of one rotation: give one of them")
 
@@ -289,14 +284,6 @@ def recorded_drives(record: xr.Dataset) -> list[Drive]:
             x, y = poses[0, :2].tolist()
             drives.setdefault((x, y), Rotation((x, y)))
     return list(drives.values())
-
-
-def _angles(given: ArrayLike) -> Floats:
-    """Return different angles in increasing order; ParameterError if they are none."""
-    angles = as_numbers(given)
-    if angles is None or angles.ndim > 1 or not angles.size or not np.all(np.abs(angles) <= _TURN):
-        raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
-    return np.unique(angles)
 
 
 def _pair(base: Any) -> tuple[float, float]:

@@ -11,8 +11,8 @@ from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.paths import ContactMode, Paths
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.sweep.columns import to_lab_frame
 from tactile_bayes.sweep.drive import Carried, Direction, Drive
-from tactile_bayes.sweep.lab_frame import to_lab_frame
 
 
 @dataclass(frozen=True)

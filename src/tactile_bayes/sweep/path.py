@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_choice, check_kind, check_number
+from tactile_bayes.checks import check_choice, check_kind
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, TactileBayesError
 from tactile_bayes.mechanics.branches.line import lines_through
-from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.rig import Rig
 from tactile_bayes.sweep.drive import Carried, Direction
 
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
@@ -28,6 +29,12 @@ _SAME = 1e-9
 # Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
 # of the object on one side seems to have passed it on the other.
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
+# Parameters that do not act in sweeps nor in readings, and what to do.
+_NOT_SWEPT = {
+    **dict.fromkeys(GROUPS["gauge"], "it is the place of a gauge, so sweep along a contour that is there"),
+    **dict.fromkeys(GROUPS["discrepancy"], "a discrepancy is a function and no number, and no sweep has it"),
+    **dict.fromkeys(("moment_noise", "force_noise"), "state it in the load cell, which `Rig.measure` applies"),
+}
 _FREE = "without friction the rod has a path (friction = 0 under [unknown] of rig.toml); with it, "
 
 # Why there is no path although the rod touches the contour.
@@ -63,91 +70,82 @@ _IN_CONTACT: dict[Reachability, tuple[type[TactileBayesError], str]] = {
 }
 
 
+class Acting(NamedTuple):
+    """What acts in a sweep: rod and friction, and compliances of suspension [rad/(EI/L)] and object [L/(EI/L²)]."""
+
+    rod: Rod = Rod()
+    friction: float = 0.0
+    suspension_compliance: float = 0.0
+    contact_compliance: float = 0.0
+
+    @classmethod
+    def of(cls, rig: Rig) -> Acting:
+        """Return what acts in sweeps of a rig with the deviations that are known."""
+        rod, known = rig.known_rod, rig.known
+        for name, correction in _NOT_SWEPT.items():
+            if known.get(name, 0.0):
+                raise ParameterError(f"{name} is known to be {known[name]:g}: {correction}")
+        yielding = known.get("contact_compliance", 0.0) * rod.force_unit / rod.length
+        return cls(rod, rig.friction, known.get("suspension_compliance", 0.0) * rod.moment_unit, yielding)
+
+    def trace(self, sweep_frame: SweepFrame, **options: Any) -> Paths:
+        """Follow paths; see `mechanics.paths.trace`."""
+        return trace(
+            sweep_frame,
+            friction_angle=np.arctan(self.friction),
+            suspension_compliance=self.suspension_compliance,
+            contact_compliance=self.contact_compliance,
+            profile=self.rod.profile,
+            **options,
+        )
+
+    def turn(self, sweep_frame: SweepFrame, drive_angles: Floats | None, *, polished: bool = True) -> Paths:
+        """Follow paths of rods that turn in one direction, with states at drive angles in the laboratory frame."""
+        if drive_angles is not None and sweep_frame.mirrored[0]:
+            drive_angles = np.pi - drive_angles
+        return self.trace(sweep_frame, drive_angles=drive_angles, polished=polished)
+
+
+_BARE = Acting()
+
+
 def sweep_paths(
     contour: Contour,
     *,
     base: tuple[float, float] = (0.0, 0.0),
     direction: Direction = "forward",
-    rod: Rod | None = None,
-    friction: float = 0.0,
-    compliance: float = 0.0,
-    yielding: float = 0.0,
+    acts: Acting = _BARE,
     drive_angles: Floats | None = None,
 ) -> Paths:
-    """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
-
-    Parameters and errors are those of `scan`, with one pivot and one direction, and the compliances of the suspension
-    [rad/(EI/L)] and of the object [L/(EI/L²)].
-    """
-    rod = Rod() if rod is None else rod
+    """Compute the exact path of one sweep along one contour; errors are those of `scan`."""
+    rod = acts.rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
-    rubbing = rod, friction_angle_of(friction), compliance, yielding
-    height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
-    if np.any(height <= base[1]):
+    height = float(contour.height(base[0])) - 0.5 * rod.diameter
+    if height <= base[1]:
         raise ContourError(
-            f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
-            f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
+            f"the contour cuts the base: at x = {base[0]:g} it is at y = {height:g}, not above the pivot at "
+            f"y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = rotated_paths(sweep_frame, *rubbing, drive_angles)
+    paths = acts.turn(sweep_frame, drive_angles)
     _refuse(paths, contour, rod, direction, f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})")
     return paths
 
 
-def rotated_paths(
-    sweep_frame: SweepFrame,
-    rod: Rod,
-    friction_angle: float,
-    compliance: float,
-    yielding: float,
-    drive_angles: Floats | None,
-    *,
-    polished: bool = True,
-) -> Paths:
-    """Follow the paths of a rod that turns in one direction, with states at drive angles in the laboratory frame."""
-    if drive_angles is not None and sweep_frame.mirrored[0]:
-        drive_angles = np.pi - drive_angles
-    return trace(
-        sweep_frame,
-        friction_angle=friction_angle,
-        suspension_compliance=compliance,
-        contact_compliance=yielding,
-        profile=rod.profile,
-        drive_angles=drive_angles,
-        polished=polished,
-    )
-
-
-def carried_paths(
-    contour: Contour,
-    drive: Carried,
-    travels: Floats,
-    *,
-    rod: Rod | None = None,
-    friction: float = 0.0,
-    compliance: float = 0.0,
-    yielding: float = 0.0,
-) -> tuple[Paths, Direction]:
+def carried_paths(contour: Contour, drive: Carried, travels: Floats, acts: Acting) -> tuple[Paths, Direction]:
     """Compute the exact path of a rod that a drive carries along one contour, and the direction that its side implies.
 
     It touches the object with its left side, as a forward sweep does, or with its right side. States are computed at
     the travels. Errors are those of `scan`.
     """
-    rod, poses = Rod() if rod is None else rod, drive.poses
-    base, friction_angle = (float(poses[0, 0]), float(poses[0, 1])), friction_angle_of(friction)
+    rod, poses = acts.rod, drive.poses
+    base = float(poses[0, 0]), float(poses[0, 1])
+    way = float(np.abs(poses[:, 0] - base[0]).max()) / rod.length
     found: dict[Direction, Paths] = {}
     for direction in _DIRECTIONS:
-        way = float(np.abs(poses[:, 0] - base[0]).max()) / rod.length
         path = lines_through(poses, rod.length, backward=direction == "backward")
         sweep_frame = replace(to_sweep_frame(contour, base, direction, rod), way=way)
-        found[direction] = trace(
-            sweep_frame,
-            friction_angle=friction_angle,
-            suspension_compliance=compliance,
-            contact_compliance=yielding,
-            profile=rod.profile,
-            drive_angles=np.interp(travels, drive.travels, path.travels),
-            lines=path.lines[None],
-        )
+        internal = np.interp(travels, drive.travels, path.travels)
+        found[direction] = acts.trace(sweep_frame, drive_angles=internal, lines=path.lines[None])
 
     first = {direction: float(of_side.first_angle[0]) for direction, of_side in found.items()}
     is_same = abs(first["forward"] - first["backward"]) < _SAME
@@ -183,10 +181,11 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 "(are contour, drive and rod in one unit?)"
             )
         case Reachability.HEAD_ON:
+            free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
             raise ReachError(
                 f"{sweep} friction lets the rod neither slide nor yield at {_point(paths)}, where it meets the object "
                 "head-on, as a strut that buckles to either side; "
-                + (_FREE if _is_free(paths, rod) else "")
+                + (_FREE if free.reach[0] == Reachability.TOUCHES else "")
                 + "take another heading or drive angle, or another pivot"
             )
         case Reachability.TOO_FAR:
@@ -216,12 +215,6 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
                 "nothing is known of the object beyond: extend the contour, or move the pivot"
             )
-
-
-def _is_free(paths: Paths, rod: Rod) -> bool:
-    """True if there is a path without friction."""
-    free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
-    return Reachability(int(free.reach[0])) is Reachability.TOUCHES
 
 
 def _point(paths: Paths) -> str:
@@ -263,10 +256,3 @@ def frame_of(contours: Contour, count: int, base: tuple[Any, Any], direction: Di
         rod.taper,
         rod.stem / rod.length,
     )
-
-
-def friction_angle_of(friction: float) -> float:
-    """Friction angle arctan μ [rad]; ParameterError where the map of the rod would fold."""
-    most = float(np.tan(MAX_FRICTION_ANGLE))
-    correction = f"give Coulomb's coefficient, a number from 0 to {most:.2f}"
-    return float(np.arctan(check_number("friction", friction, correction, least=0.0, most=most)))

@@ -23,14 +23,12 @@ from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig import make_record
-from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import pivot_shifts
-from tactile_bayes.sweep.columns import ManyUnits, sweep_samples
+from tactile_bayes.sweep.columns import ManyUnits, sweep_samples, to_lab_frame
 from tactile_bayes.sweep.drive import Carried, Direction, Drive, Motion, Rotation, Translation, drives_of
 from tactile_bayes.sweep.events import SweepEvents, events_of
-from tactile_bayes.sweep.lab_frame import to_lab_frame
-from tactile_bayes.sweep.path import carried_paths, friction_angle_of, sweep_paths, to_sweep_frame
+from tactile_bayes.sweep.path import Acting, carried_paths, sweep_paths, to_sweep_frame
 
 _MARGIN = 15  # number of drive steps before first contact and after snap-off
 # Largest number of corrections of a tapered rod's standoff, and the last change of the arc length [L].
@@ -39,13 +37,6 @@ _MOST_MOVES, _SETTLED = 50, 1e-15
 _STEP, _SHARE = float(np.radians(1.0)), 0.01
 _FEWEST_POSES = 8  # number of poses of a motion up to which it is sampled by steps, and not at these
 _TURN = 2.0 * math.pi
-
-# Parameters that do not act in sweeps nor in readings, and what to do.
-_NOT_SWEPT = {
-    **dict.fromkeys(GROUPS["gauge"], "it is the place of a gauge, so sweep along a contour that is there"),
-    **dict.fromkeys(GROUPS["discrepancy"], "a discrepancy is a function and no number, and no sweep has it"),
-    **dict.fromkeys(("moment_noise", "force_noise"), "state it in the load cell, which `Rig.measure` applies"),
-}
 
 
 class _ByDirection(dict[str, SweepEvents]):
@@ -145,19 +136,22 @@ def equilibria(
     pivots = check_pivots("base", base)
     if len(pivots) > 1:
         raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
-    rod, friction, compliance, yielding = acting(rig)
-    if yielding:
+    acts = Acting.of(rig_of(rig))
+    rod = acts.rod
+    if acts.contact_compliance:
         raise ParameterError("contact_compliance is known, but equilibria are of an object that does not yield")
     sweep_frame = to_sweep_frame(contour, pivots[0], direction, rod)
     index = np.zeros(alpha.size, dtype=np.intp)
     side = -1.0 if sweep_frame.mirrored[0] else 1.0
     parameter = side * contour.parameter_of_slope(alpha)
     locus = replace(sweep_frame, standoff=0.0).locate(index, parameter)
-    states = States(parameter, locus.x, locus.y, locus.slope_angle, _wrench(locus, rod, friction, side))
+    states = States(parameter, locus.x, locus.y, locus.slope_angle, _wrench(locus, acts, side))
     wrench = states.wrench
     columns = to_lab_frame(sweep_frame, index, states, rod)
     reached = wrench.phase != NONE
-    columns["drive_angle"] = columns["drive_angle"] + compliance * columns["holding_moment"] / rod.moment_unit
+    columns["drive_angle"] = (
+        columns["drive_angle"] + acts.suspension_compliance * columns["holding_moment"] / rod.moment_unit
+    )
     columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
     data, units = {}, "dimensionless" if rod.is_dimensionless else "SI"
     for name, values in columns.items():
@@ -169,9 +163,9 @@ def equilibria(
     return xr.Dataset(data, coords={"slope_angle": ("slope_angle", alpha, column_attributes("slope_angle", units))})
 
 
-def _wrench(locus: Locus, rod: Rod, friction: float, side: float) -> Wrench:
+def _wrench(locus: Locus, acts: Acting, side: float) -> Wrench:
     """Base wrench in the sweep frame, for points of the object."""
-    surface, alpha = rod.surface, locus.slope_angle
+    rod, surface, alpha = acts.rod, acts.rod.surface, locus.slope_angle
     arclength = np.ones(alpha.shape)
     for _ in range(_MOST_MOVES if surface.half_angle else 1):
         d = surface.standoff(arclength)
@@ -179,7 +173,7 @@ def _wrench(locus: Locus, rod: Rod, friction: float, side: float) -> Wrench:
             locus.x + d * np.sin(alpha),
             locus.y - d * np.cos(alpha),
             alpha + surface.half_angle,
-            surface.friction_angle(friction_angle_of(friction)),
+            surface.friction_angle(np.arctan(acts.friction)),
             rest_curvature=side * rod.arc_curvature,
             stem=rod.stem / rod.length,
             profile=None if rod.profile is None else rod.profile._replace(sign=side),
@@ -257,23 +251,29 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
-    acts = acting(rig)
-    short: dict[str, Any] = {"direction": direction, "drive_step": drive_step, "drive_angles": drive_angles}
-    pivots: list[Drive] = [Rotation(pivot, **short) for pivot in check_pivots("base", base)] if drive is None else []
-    drives = pivots or drives_of(drive)
-    if drive is not None and (given := _given(base, short)):
-        raise ParameterError(
-            f"{given} is for rotations without a drive: give it to the drive, as in Rotation({given}=…)"
-        )
-
+    acts, pivots = Acting.of(rig_of(rig)), check_pivots("base", base)
+    is_given = {
+        "base": pivots != [(0.0, 0.0)],
+        "direction": direction != "both",
+        "drive_step": drive_step is not None,
+        "drive_angles": drive_angles is not None,
+    }
+    drives: list[Drive] = [Rotation(pivot, direction, drive_step, drive_angles) for pivot in pivots]
+    if drive is not None:
+        for name in (name for name, given in is_given.items() if given):
+            raise ParameterError(
+                f"{name} is for rotations without a drive: give it to the drive, as in Rotation({name}=…)"
+            )
+        drives = drives_of(drive)
     columns: list[dict[str, NDArray[Any]]] = []
     sweeps: list[SweepEvents] = []
     for one in _shifted(drives, rig_of(rig)):
-        for paths, sense, every in _paths_of(contour, one, *acts):
-            sweep = events_of(paths, sense, one, acts[0])
-            _warn_of(sweep, one, acts[0])
+        for paths, sense, every in _paths_of(contour, one, acts):
+            sweep = events_of(paths, sense, one, acts.rod)
+            for category, message in _warnings_of(sweep, one, acts.rod):
+                warnings.warn(message, category, stacklevel=2)
             chosen, poses = _sampled(one, every, sweep)
-            columns.append(_columns(paths, chosen, poses, len(sweeps), sweep.direction, acts[0]))
+            columns.append(_columns(paths, chosen, poses, len(sweeps), sweep.direction, acts.rod))
             sweeps.append(sweep)
     if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
         snaps = ", ".join(f"{sweep.snap_off.drive_angle:.6g} rad ({sweep.direction})" for sweep in sweeps)
@@ -282,18 +282,7 @@ def scan(
             "the rod does not come free of the object: give angles before it too"
         )
     record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
-    return Scan(make_record(record, Rig(rod=acts[0])), tuple(sweeps), contour)
-
-
-def acting(rig: Rig | None) -> tuple[Rod, float, float, float]:
-    """Return rod, friction and compliances, of the suspension [rad/(EI/L)] and of the object [L/(EI/L²)], of a rig."""
-    rig = rig_of(rig)
-    rod, known = rig.known_rod, rig.known
-    for name, correction in _NOT_SWEPT.items():
-        if known.get(name, 0.0):
-            raise ParameterError(f"{name} is known to be {known[name]:g}: {correction}")
-    yielding = known.get("contact_compliance", 0.0) * rod.force_unit / rod.length
-    return rod, rig.friction, known.get("suspension_compliance", 0.0) * rod.moment_unit, yielding
+    return Scan(make_record(record, Rig(rod=acts.rod)), tuple(sweeps), contour)
 
 
 def _shifted(drives: list[Drive], rig: Rig) -> list[Drive]:
@@ -313,22 +302,13 @@ def _shifted(drives: list[Drive], rig: Rig) -> list[Drive]:
     return found
 
 
-def _given(base: Any, options: Mapping[str, Any]) -> str | None:
-    """Return the name of the first option of a rotation that is given; None if all are left out."""
-    given = [name for name, value in options.items() if value is not None and str(value) != "both"]
-    return "base" if check_pivots("base", base) != [(0.0, 0.0)] else next(iter(given), None)
-
-
-def _paths_of(
-    contour: Contour, drive: Drive, rod: Rod, friction: float, compliance: float, yielding: float
-) -> Iterator[tuple[Paths, Direction, Floats]]:
+def _paths_of(contour: Contour, drive: Drive, acts: Acting) -> Iterator[tuple[Paths, Direction, Floats]]:
     """Follow the path of each sweep of a drive, with states at its drive angles or travels, which are increasing."""
-    known: dict[str, Any] = {"rod": rod, "friction": friction, "compliance": compliance, "yielding": yielding}
     if isinstance(drive, Carried):
         travels = drive.travels
         if drive.drive_step is not None or not isinstance(drive, Motion) or drive.x.size <= _FEWEST_POSES:
-            travels = drive.by(drive.drive_step or _SHARE * rod.length)
-        yield *carried_paths(contour, drive, travels, **known), travels
+            travels = drive.by(drive.drive_step or _SHARE * acts.rod.length)
+        yield *carried_paths(contour, drive, travels, acts), travels
         return
     if drive.drive_angles is not None:
         angles = np.array(drive.drive_angles)
@@ -337,8 +317,7 @@ def _paths_of(
         angles = np.arange(np.floor(-_TURN / step), np.ceil(_TURN / step) + 1) * step
         angles = angles[np.abs(angles) <= _TURN]  # a drive turns by no more
     for sense in drive.directions:
-        paths = sweep_paths(contour, base=drive.base, direction=sense, drive_angles=angles, **known)
-        yield paths, sense, angles
+        yield sweep_paths(contour, base=drive.base, direction=sense, acts=acts, drive_angles=angles), sense, angles
 
 
 def _sampled(drive: Drive, every: Floats, sweep: SweepEvents) -> tuple[Index, Floats]:
@@ -378,37 +357,34 @@ def _within_a_turn(drive: Rotation, every: Floats, sweep: SweepEvents) -> Index:
     return np.asarray(chosen[kept][:: int(sense)])
 
 
-def _warn_of(sweep: SweepEvents, drive: Drive, rod: Rod) -> None:
-    where = _name(sweep)
+def _warnings_of(sweep: SweepEvents, drive: Drive, rod: Rod) -> Iterator[tuple[type[UserWarning], str]]:
+    """Yield what is to be warned of after a sweep."""
+    where, strain = _name(sweep), sweep.largest_strain
     if not sweep.clear:
-        warnings.warn(
-            f"{where} the rod snaps at {_place(sweep)}, but unloaded it would still cut the "
-            "object: it comes to rest in another contact, which no sweep reaches; the samples after that are left out",
+        yield (
             ClearanceWarning,
-            stacklevel=3,
+            f"{where} the rod snaps at {_place(sweep)}, but unloaded it would still cut the object: it comes to rest "
+            "in another contact, which no sweep reaches; the samples after that are left out",
         )
     if sweep.clear and not math.isnan(sweep.touches_again):
         x, y, angle = drive.at(sweep.touches_again) if isinstance(drive, Carried) else (math.nan,) * 3
-        warnings.warn(
+        yield (
+            ClearanceWarning,
             f"{where} the rod is free after {_place(sweep)}, and touches the object again at base ({x:.6g}, {y:.6g}) "
             f"and drive angle {angle:.6g} rad, a travel of {sweep.touches_again:.6g}: a sweep has one contact, and the "
             "samples after that are left out; end the drive there, and scan the rest as a drive of its own",
-            ClearanceWarning,
-            stacklevel=3,
         )
-    if sweep.largest_strain > LARGEST_STRAIN:
-        warnings.warn(
-            f"{where} the rod is strained by {sweep.largest_strain:.3g}: beyond {LARGEST_STRAIN:g} it is neither "
-            "slender nor linearly elastic, and the loads are unreliable; take a thinner or longer rod",
+    if strain > LARGEST_STRAIN:
+        yield (
             StrainWarning,
-            stacklevel=3,
+            f"{where} the rod is strained by {strain:.3g}: beyond {LARGEST_STRAIN:g} it is neither slender nor "
+            "linearly elastic, and the loads are unreliable; take a thinner or longer rod",
         )
-    if rod.elastic_strain is not None and sweep.largest_strain > rod.elastic_strain:
-        warnings.warn(
-            f"{where} the rod is strained by {sweep.largest_strain:.3g}, beyond its elastic strain of "
-            f"{rod.elastic_strain:g}: it would stay bent; take a thinner or longer rod, or stop the drive earlier",
+    if rod.elastic_strain is not None and strain > rod.elastic_strain:
+        yield (
             StrainWarning,
-            stacklevel=3,
+            f"{where} the rod is strained by {strain:.3g}, beyond its elastic strain of {rod.elastic_strain:g}: it "
+            "would stay bent; take a thinner or longer rod, or stop the drive earlier",
         )
 
 

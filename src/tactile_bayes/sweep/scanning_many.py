@@ -8,16 +8,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.checks import check_array, check_choice, check_numbers
+from tactile_bayes.checks import check_choice, check_numbers
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.record.schema import column_attributes
-from tactile_bayes.rig.rig import Rig
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
-from tactile_bayes.sweep.path import frame_of, friction_angle_of, rotated_paths
-from tactile_bayes.sweep.scanning import acting
+from tactile_bayes.sweep.path import Acting, frame_of
 
 
 def scan_many(
@@ -78,27 +77,19 @@ def scan_many(
             f"contours with parameters of shape (n,) are wanted, not of shape {contours.shape}: for one contour, use "
             "scan"
         )
-    (rod, friction, compliance, yielding), (count,) = acting(rig), contours.shape
+    acts, (count,) = Acting.of(rig_of(rig)), contours.shape
+    correction = "give angles in radians, at most a turn (2π); those in degrees are converted by np.radians"
+    angles = check_numbers("drive_angles", drive_angles, correction, least=-2.0 * np.pi, most=2.0 * np.pi)
     try:
         x, y = (np.broadcast_to(check_numbers("base", b), (count,)) for b in base)
-        angles = check_array("drive_angles", drive_angles)
         angles = np.broadcast_to(angles, (count, angles.shape[-1]))
     except (TypeError, ValueError, IndexError) as error:
         raise ParameterError(
             f"for {count} contours give bases as numbers or arrays of shape ({count},), and drive_angles of shape (k,) "
             f"or ({count}, k)"
         ) from error
-    if not np.all(np.isfinite(angles)):
-        raise ParameterError("drive_angles must be finite angles in radians")
-    if np.any(np.abs(angles) > 2.0 * np.pi):
-        largest = float(angles.flat[np.argmax(np.abs(angles))])
-        raise ParameterError(
-            f"drive_angles must be angles in radians, at most a turn (2π), but {largest:g} is among them: those in "
-            "degrees are converted by np.radians"
-        )
-    sweep_frame = frame_of(contours, count, (x, y), direction, rod)
-    of_rig = rod, friction_angle_of(friction), compliance, yielding
-    paths = rotated_paths(sweep_frame, *of_rig, angles, polished=False)
+    rod = acts.rod
+    paths = acts.turn(frame_of(contours, count, (x, y), direction, rod), angles, polished=False)
     units = ManyUnits.of_rod(rod)
     system = "dimensionless" if rod.is_dimensionless else "SI"
 
@@ -113,9 +104,8 @@ def scan_many(
     variables["contact_phase"] = labelled(both, phase, "contact_phase")
     statuses = np.array([one.message for one in Reachability])
     variables["status"] = ("contour", statuses[paths.reach])
-    with np.errstate(invalid="ignore"):
-        variables["clear"] = ("contour", paths.is_clear())
+    variables["clear"] = ("contour", paths.is_clear())
     variables["phases"] = ("contour", np.array(phases_of(paths), dtype=np.str_))
     for event, columns in sweep_events(paths, units).items():
         variables |= {f"{event}_{name}": labelled("contour", values, name) for name, values in columns.items()}
-    return xr.Dataset(variables, attrs={"units": system, "direction": direction, "friction": friction})
+    return xr.Dataset(variables, attrs={"units": system, "direction": direction, "friction": acts.friction})
