@@ -4,13 +4,6 @@ import numpy as np
 import pytest
 
 import tactile_bayes as tb
-from tactile_bayes.mechanics.contacts.contact_coordinates import (
-    contact_states,
-    contact_states_and_slopes,
-    place_by_wrench,
-)
-from tactile_bayes.mechanics.elastica import contact_from_wrench
-from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import Rig
 
 RODS = {
@@ -23,7 +16,6 @@ RODS = {
         rest_curvature=([0.0, 0.4, 1.0], [0.1, -0.2, -0.5]), rigidity_profile=lambda s: np.exp(-2.0 * s)
     ),
 }
-VARIED = [name for name, rod in RODS.items() if rod.profile is not None]
 CELL = tb.LoadCell(force_noise=1e-9, moment_noise=1e-9)
 NOISY = tb.LoadCell(force_noise=5e-3, moment_noise=2e-3)
 TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
@@ -66,61 +58,6 @@ def test_an_si_record_states_all_that_step_2_takes(name):
     found = tb.reconstruct(record, rig=Rig(load_cell=tb.LoadCell(force_noise=1e-12, moment_noise=1e-13)))
     loaded = record["truth_contact_phase"].values != "none"
     np.testing.assert_allclose(found["contact_x"].values[loaded], record["truth_contact_x"].values[loaded], atol=1e-10)
-
-
-def _coordinates(record, side):
-    """Coordinates of the contacts of the sweeps of one side, mirrored to forward ones."""
-    loaded = (record["truth_contact_phase"].values != "none") & (
-        record["direction"].values == ("forward" if side > 0.0 else "backward")
-    )
-    part = record.isel(sample=loaded)
-    force = np.hypot(part["force_x"], part["force_y"]).values
-    tip_angle, angle = part["truth_tip_angle"].values, part["drive_angle"].values
-    if side < 0.0:
-        tip_angle, angle = np.pi - tip_angle, np.pi - angle
-    psi1 = tip_angle - np.arctan2(-side * part["force_x"].values, part["force_y"].values)
-    z = np.stack([force, psi1, part["truth_contact_arclength"].values, angle], axis=1)
-    return z[force > 1e-3], part.isel(sample=force > 1e-3)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("name", VARIED)
-def test_states_follow_from_their_coordinates(name, side):
-    record = swept(name)
-    z, part = _coordinates(record, side)
-    rods = RODS[name].mirrored(np.full(len(z), side))
-    found, slopes = contact_states_and_slopes(z, 0.0, rods)
-    for k, channel in enumerate(CHANNELS):
-        sign = 1.0 if channel == "force_y" else side
-        np.testing.assert_allclose(found.loads[k], sign * part[channel].values, rtol=1e-8, atol=1e-9)
-    h = 1e-6
-    for c in range(4):
-        step = h * np.eye(4)[c]
-        more, less = (contact_states(z + sign * step, 0.0, rods) for sign in (1.0, -1.0))
-        by = (more.loads - less.loads).T / (2.0 * h)
-        scale = 1.0 + np.abs(slopes.loads[:, :, c])
-        inside = np.isfinite(by).all(axis=1)
-        assert inside.mean() > 0.8
-        np.testing.assert_array_less(np.abs(by - slopes.loads[:, :, c])[inside], 2e-5 * scale[inside])
-
-
-@pytest.mark.parametrize("name", VARIED)
-def test_derivatives_of_step_2_are_its_differences(name):
-    z, part = _coordinates(swept(name), 1.0)
-    found = place_by_wrench(z, RODS[name].mirrored(np.ones(len(z))))
-    wrench = np.stack([part["drive_angle"].values, *(part[channel].values for channel in CHANNELS)])
-    h = 1e-7
-    for c in range(4):
-        step = h * np.eye(4)[c][:, None]
-        more, less = (
-            contact_from_wrench(*(wrench + sign * step), side=1.0, profile=RODS[name].profile) for sign in (1.0, -1.0)
-        )
-        for k, field in enumerate(TRUTHS):
-            by = (getattr(more, field) - getattr(less, field)) / (2.0 * h)
-            scale = 1.0 + np.abs(found[:, k]).max(axis=1)
-            good = np.isfinite(by) & (scale < 1e3)
-            assert good.mean() > 0.7
-            np.testing.assert_array_less(np.abs(by - found[:, k, c])[good], 1e-4 * scale[good])
 
 
 @pytest.mark.parametrize("name", ["arc", pytest.param("tapered", marks=pytest.mark.slow)])

@@ -104,8 +104,13 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     _refuse_without_noise(samples)
     with np.errstate(over="ignore"):
         usable = np.isfinite(samples.reading.loads**2).all(axis=1)
-    reasons = {Status.NO_CONTACT: ~samples.loaded, Status.CUT_OFF: samples.cut_off}
-    status = _status_by({**reasons, Status.NO_ZERO_OF_CURVATURE: ~usable})
+    status = _status_by(
+        {
+            Status.NO_CONTACT: ~samples.loaded,
+            Status.CUT_OFF: samples.cut_off,
+            Status.NO_ZERO_OF_CURVATURE: ~usable,
+        }
+    )
     where = np.flatnonzero(status == Status.OK)
     reading, given = samples.reading.take(where), (delta[where], samples.rods.take(where))
     fit = fit_contacts(reading, *given)
@@ -119,15 +124,16 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
         bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
         bent |= np.abs(place[:, 2]) > 0.49 * np.pi
     rivalled = found & (fit.rival < _RIVAL)
-    reasons = {
-        Status.NO_ZERO_OF_CURVATURE: ~found,
-        Status.DOES_NOT_FIT: fit.misfit > _MISFIT,
-        Status.AMBIGUOUS: rivalled & (fit.other_phase == fit.phase),
-        Status.BETWEEN_PHASES: fit.clearance < _CLEARANCE,
-        Status.EITHER_PHASE: rivalled,
-        Status.NONLINEAR: bent,
-    }
-    status[where] = _status_by(reasons)
+    status[where] = _status_by(
+        {
+            Status.NO_ZERO_OF_CURVATURE: ~found,
+            Status.DOES_NOT_FIT: fit.misfit > _MISFIT,
+            Status.AMBIGUOUS: rivalled & (fit.other_phase == fit.phase),
+            Status.BETWEEN_PHASES: fit.clearance < _CLEARANCE,
+            Status.EITHER_PHASE: rivalled,
+            Status.NONLINEAR: bent,
+        }
+    )
     has_other = np.isin(status[where], (Status.AMBIGUOUS, Status.EITHER_PHASE))
 
     def of_all(values: NDArray[Any], known: Flags = found, blank: float = np.nan) -> NDArray[Any]:
@@ -189,7 +195,7 @@ def _bends_too_much(fit: ContactFit, place: Floats, covariance: Floats, delta: F
     return bent
 
 
-def _status_by(reasons: Mapping[Status, Flags]) -> NDArray[np.int8]:
+def _status_by(reasons: Mapping[Status, Any]) -> NDArray[np.int8]:
     """Return the status of samples: the first whose reason holds, OK without any."""
     return np.select(list(reasons.values()), list(reasons), Status.OK).astype(np.int8)
 
