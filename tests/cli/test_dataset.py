@@ -17,7 +17,7 @@ import tactile_bayes as tb
 from helpers import commands
 from helpers.commands import assert_refused
 from tactile_bayes.contours.families import FAMILIES, FLANKS
-from tactile_bayes.datasets.specification_text import left_out
+from tactile_bayes.datasets.specification import left_out
 from tactile_bayes.record import LOAD_CELL_UNITS
 
 SMALL = """

@@ -131,7 +131,7 @@ def translation(**changes):
         (translation(base=0.0), ["scan.translations[0].base is 0.0", "[x, y]"]),
         (translation(travel=None), ["scan.translations[0] has neither travel nor step"]),
         (translation(step=0.01), ["scan.translations[0] has both travel and step"]),
-        (translation(travel=0.0), ["scan.translations[0].travel may be 0"]),
+        (translation(travel=0.0), ["scan.translations[0].travel is 0"]),
         (translation(travel=None, step={"uniform": [-1, 1]}), ["scan.translations[0].step may be negative"]),
         (translation(heading=180.0), ["scan.translations[0].heading may be 180", "radians"]),
         (translation(drive_angle={"each": [1.0, 80.0]}), ["scan.translations[0].drive_angle may be 80"]),

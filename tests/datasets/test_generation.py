@@ -15,7 +15,7 @@ from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.datasets import contour_of, read_specification, record
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
-from tactile_bayes.datasets.specification_text import left_out
+from tactile_bayes.datasets.specification import left_out
 from tactile_bayes.errors import SpecificationError, StrainWarning
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING, Rig
@@ -202,18 +202,6 @@ def test_numbers_follow_their_distributions():
     assert stats.kstest(data.truth_contour_r.values[circle], stats.uniform(0.4, 0.6).cdf).pvalue > FALSE_ALARM
 
 
-@pytest.mark.slow
-def test_weights_of_shape_free_radii_are_standard_normal():
-    """And independent of one another; what they make of a radius is a matter of the family."""
-    data = generated(drawn_from("shape-free", 500, scan={"samples": 2}, contours=[
-        {"family": "shape-free", "r": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": 0.5},
-    ]))  # fmt: skip
-    weights = np.stack([data[f"truth_contour_{name}"].values for name in SHAPE_FREE.directions])
-    assert min(stats.kstest(z, "norm").pvalue for z in weights) > FALSE_ALARM / len(weights)
-    correlation = np.corrcoef(weights)[np.triu_indices(len(weights), 1)]
-    assert np.abs(correlation).max() < stats.norm.isf(FALSE_ALARM / 2 / correlation.size) / np.sqrt(500)
-
-
 def test_a_weight_may_have_a_distribution_of_its_own():
     """Without weights the contour is a circle; a thousandth of a weight bends it as the family says."""
     plain = {"r": 0.8, "amplitude": 0.5, "length_scale": 1.0, "q": 0.5, **dict.fromkeys(SHAPE_FREE.directions, 0.0)}
@@ -344,8 +332,9 @@ def test_records_whose_rod_is_strained_beyond_the_model_are_counted(diameter):
             scan = tb.scan(contour_of(one), rig=Rig(rod=tb.Rod(0.2, 0.0024, diameter)))
             largest[i] = [scan.events[direction].largest_strain for direction in ("forward", "backward")]
     np.testing.assert_allclose(records.sweep["largest_strain"], largest, rtol=0.01)
-    assert records.strained == np.count_nonzero(np.any(largest > 0.1, axis=1))
-    assert (records.strained == 12) == (diameter == 0.05)
+    strained = records.counts["strained"]
+    assert strained == np.count_nonzero(np.any(largest > 0.1, axis=1))
+    assert (strained == 12) == (diameter == 0.05)
     stored = records_as_dataset(said, records).truth_largest_strain
     assert stored.dims == ("record", "sweep")
 

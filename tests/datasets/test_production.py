@@ -19,7 +19,7 @@ from helpers.refusals import refused
 from helpers.tasks import alive, wait_until
 from tactile_bayes.datasets import generate, verify
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
-from tactile_bayes.datasets.specification_text import toml_of
+from tactile_bayes.datasets.specification import toml_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import Workers
 
@@ -202,7 +202,7 @@ def test_another_data_set_is_left_alone(folder):
             {"contours": [{**contour, "q": {"normal": [0.5, 0.1]}}]},
             ["contours[0].q is {'uniform': [0.3, 0.7]} there and is {'normal': [0.5, 0.1]} here"],
         ),
-        ({"contours": [contour, circle]}, ["contours[1]", "left out there", "family 'circle' here"]),
+        ({"contours": [contour, circle]}, ["contours[1].family", "left out there", "'circle' here"]),
         ({"contours": [circle | {"q": 0.5}]}, ["family", "'parabola'", "'circle'", "2 more"]),
         ({"rod": rod, "scan__bases": pivots}, ["scan.bases", "left out there", f"{str(pivots)[:59]}…", "rod.length"]),
         ({"unknown": {"friction": 0.1}}, ["unknown.friction", "left out there", "0.1 here"]),

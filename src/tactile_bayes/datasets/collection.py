@@ -56,12 +56,10 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     folder = check_path("path", path, "give the folder of a data set")
     manifest = read_manifest(folder)
     if manifest.shards and not manifest.is_complete:
-        have = sum(shard.records for shard in manifest.shards)
-        warnings.warn(
-            f"{folder} has {have} of {manifest.records} records: run dataset generate again for the others",
-            UserWarning,
-            stacklevel=2,
+        missing = (
+            f"{folder} has {manifest.made} of {manifest.records} records: run dataset generate again for the others"
         )
+        warnings.warn(missing, UserWarning, stacklevel=2)
     return opened(folder, manifest)
 
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.datasets.variations import Variation, variation_of
+from tactile_bayes.datasets.variations import Variation, quantity_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.drawn import calibrated_at, unknown_of
 from tactile_bayes.rig.parameters import GROUPS, NEUTRAL, SENSOR, parameter_named
 from tactile_bayes.rig.rig import Rig
-from tactile_bayes.rig.rig_file import number_in, unit_of_unknown
+from tactile_bayes.rig.rig_file import unit_of_unknown
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated, within_bounds
 from tactile_bayes.rig.unknown import DEFAULT, NOTHING, expanded, of_pivots
@@ -50,7 +49,12 @@ def deviations_of_table(
     if said is None:
         said = {name: value for name, value in expanded(NOTHING).items() if name not in found}
     table: Mapping[str, Any] = NOTHING if isinstance(said, str) else said
-    given = {name: _variation(name, value, is_si) for name, value in table.items()}
+    given = {
+        name: Variation(DEFAULT)
+        if value == DEFAULT
+        else quantity_of(value, f"unknown.{name}", unit_of_unknown(name), is_si)
+        for name, value in table.items()
+    }
     if isinstance(said, str) and said != "nothing":
         raise SpecificationError(f'unknown is {said!r}: give a table [unknown], or "nothing"')
     rig = Rig(unknown=_checked(given), calibration=calibration)
@@ -64,13 +68,6 @@ def deviations_of_table(
         raise SpecificationError(f"unknown.{gauge[0]} is of the record of a gauge: leave it out of a data set")
     kept = {name: variation for name, variation in every.items() if not _is_as_stated(name, variation)}
     return {**kept, **dict.fromkeys(found, Variation("calibrated"))}
-
-
-def _variation(name: str, value: Any, is_si: bool) -> Variation:
-    if value == DEFAULT:
-        return Variation(DEFAULT)
-    key = f"unknown.{name}"
-    return variation_of(value, key, partial(number_in, unit=unit_of_unknown(name), name=key, is_si=is_si))
 
 
 def _checked(given: Mapping[str, Variation]) -> dict[str, Any]:
@@ -87,8 +84,7 @@ def _checked(given: Mapping[str, Variation]) -> dict[str, Any]:
 
 def _is_as_stated(name: str, variation: Variation) -> bool:
     parameter = parameter_named(name)
-    assert parameter is not None
-    return variation.kind == "constant" and variation.numbers[0] == parameter.neutral
+    return variation.kind == "constant" and parameter is not None and variation.numbers[0] == parameter.neutral
 
 
 def is_around_the_stated(key: str, variation: Variation) -> bool:

@@ -28,7 +28,7 @@ from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rods.profile import profile_of
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN
-from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
+from tactile_bayes.sweep.columns import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
 _MOST_DRAWS = 1000  # largest number of draws of one record
 # Number of draws that are tested together for the last records: superfluous draws cost less than another call.
@@ -56,21 +56,14 @@ class Records:
     redrawn: Counter[str]  # numbers of rejected draws by reason
 
     @property
-    def strained(self) -> int:
-        """Number of records with a sweep in which the strain of the rod exceeds the model."""
-        strain = self.sweep.get("largest_strain", np.zeros((1, 1)))
-        return int(np.count_nonzero(np.any(strain > LARGEST_STRAIN, axis=1)))
-
-    @property
-    def untouched(self) -> int:
-        """Number of sweeps without a sample in contact."""
-        return int(np.count_nonzero(~np.any(self.sample["truth_contact_phase"], axis=2)))
-
-    @property
     def counts(self) -> dict[str, Any]:
         """Counts that the manifest states of a shard, by its names for them."""
-        redrawn = {reason: count for reason, count in sorted(self.redrawn.items()) if count}
-        return {"redrawn": redrawn, "strained": self.strained, "untouched": self.untouched}
+        strain = self.sweep.get("largest_strain", np.zeros((1, 1)))
+        return {
+            "redrawn": {reason: count for reason, count in sorted(self.redrawn.items()) if count},
+            "strained": int(np.count_nonzero(np.any(strain > LARGEST_STRAIN, axis=1))),
+            "untouched": int(np.count_nonzero(~np.any(self.sample["truth_contact_phase"], axis=2))),
+        }
 
 
 _NOT_CLEAR = "not clear after snap-off"
@@ -88,6 +81,7 @@ _CORRECTIONS = {
     "touched at the beginning": "begin the translations farther from the contours",
     "met head-on": "take friction = 0 under [unknown], or another heading or drive angle",
     "slips off at once": "give rods that are less curved, or bring contours and pivots closer to one another",
+    "folded over at its tip": "give rods that are stiffer or less curved at their tips",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the unloaded rod would still cut the object",
     _NO_CONTOUR: "change the distribution of that parameter",
@@ -304,8 +298,7 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
 def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
     """Return the reasons for rejection of candidates with so many sweeps each, side by side."""
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
-    with np.errstate(invalid="ignore"):
-        clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
+    clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
     reasons = np.array([one.message for one in Reachability], dtype=object)[fate]
     return np.where((fate == Reachability.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
 

@@ -7,11 +7,11 @@ import json
 import platform
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from tactile_bayes.datasets.shard import Written, file_in, shard_file
 from tactile_bayes.datasets.specification import Specification
@@ -42,7 +42,7 @@ class Manifest:
     records: int
     shard_records: int
     versions: Mapping[str, str]  # of Python and of the libraries on which numbers and bytes depend
-    shards: tuple[Written, ...] = field(default=())  # complete files, by number
+    shards: tuple[Written, ...] = ()  # complete files, by number
     card_sha256: str = ""  # of the data card; "" as long as there is none
 
     @classmethod
@@ -50,13 +50,18 @@ class Manifest:
         """Return the manifest of a data set without files."""
         return cls(spec.name, spec.text, spec.sha256, spec.seed, spec.records, spec.shard_records, versions_here())
 
-    def having(self, written: Iterable[Written]) -> Manifest:
-        """Return the manifest with further files."""
-        return replace(self, shards=tuple(sorted([*self.shards, *written], key=lambda shard: shard.first)))
+    def having(self, written: Written) -> Manifest:
+        """Return the manifest with a further file."""
+        return replace(self, shards=tuple(sorted([*self.shards, written], key=lambda shard: shard.first)))
+
+    @property
+    def made(self) -> int:
+        """Number of records in the existing files."""
+        return sum(shard.records for shard in self.shards)
 
     @property
     def is_complete(self) -> bool:
-        return sum(shard.records for shard in self.shards) == self.records
+        return self.made == self.records
 
     @property
     def redrawn(self) -> Counter[str]:
@@ -122,8 +127,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 def _check(manifest: Manifest) -> None:
     """Check that entries have their types, and that shards are those of the records of the specification, in order."""
-    _refuse_unless_typed(manifest, texts=("name", "specification", "specification_sha256", "card_sha256"))
-    _refuse_unless_typed(manifest, counts=("seed", "records", "shard_records"))
+    _refuse_unless_typed(manifest)
     if not all(isinstance(text, str) for text in [*manifest.versions.keys(), *manifest.versions.values()]):
         raise ValueError("its versions are not texts")
     try:
@@ -133,9 +137,8 @@ def _check(manifest: Manifest) -> None:
     _refuse_other(vars(manifest), {name: stated[name] for name in _OF_SPECIFICATION})
     before = -1
     for shard in manifest.shards:
-        _refuse_unless_typed(shard, texts=("file", "sha256"))
-        _refuse_unless_typed(shard, counts=("first", "records", "bytes", "strained", "untouched", *shard.redrawn))
-        number, offset = divmod(shard.first, manifest.shard_records or 1)
+        _refuse_unless_typed(shard)
+        number, offset = divmod(shard.first, manifest.shard_records)
         records = min(manifest.shard_records, manifest.records - shard.first)
         if offset or number <= before or shard.records != records or shard.file != shard_file(number):
             raise ValueError(f"{shard.file!r} from record {shard.first} on is no file of this data set")
@@ -153,13 +156,14 @@ def _refuse_other(entries: Mapping[str, Any], right: Mapping[str, Any]) -> None:
             raise ValueError(f"its {name} is {entries[name]!r}, and {value!r} follows from its other entries")
 
 
-def _refuse_unless_typed(of: Manifest | Written, texts: Sequence[str] = (), counts: Sequence[str] = ()) -> None:
-    entries = of._asdict() | of.redrawn if isinstance(of, Written) else vars(of)
-    for names, kind in ((texts, str), (counts, int)):
-        if wrong := [name for name in names if type(entries[name]) is not kind]:
-            raise ValueError(f"its {wrong[0]} is {entries[wrong[0]]!r}")
-    if negative := [name for name in counts if entries[name] < 0]:
-        raise ValueError(f"its {negative[0]} is {entries[negative[0]]!r}")
+def _refuse_unless_typed(of: Manifest | Written) -> None:
+    """Refuse texts and counts that are none."""
+    entries = {name: (getattr(of, name), kind) for name, kind in get_type_hints(type(of)).items()}
+    if isinstance(of, Written):
+        entries |= {reason: (count, int) for reason, count in of.redrawn.items()}
+    for name, (value, kind) in entries.items():
+        if kind in (str, int) and (type(value) is not kind or (kind is int and value < 0)):
+            raise ValueError(f"its {name} is {value!r}")
 
 
 def _content(table: Mapping[str, Any]) -> bytes:

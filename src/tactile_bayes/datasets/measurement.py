@@ -18,21 +18,11 @@ from tactile_bayes.load_cell.blocks import elapsed
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.record import CHANNELS, turned
 
+_NOISES, _OF_ENCODER = ("force_noise", "moment_noise", "relative_noise"), ("offset", "backlash", "noise")
 # Entries of a data sheet whose validity does not depend on the others: field, and position in it.
 _HARMLESS: dict[str, tuple[str, int | None]] = {
-    **{
-        name: (name, None)
-        for name in (
-            "force_noise",
-            "moment_noise",
-            "relative_noise",
-            "drive_angle_offset",
-            "drive_angle_backlash",
-            "drive_angle_noise",
-        )
-    },
-    "lever_x": ("lever", 0),
-    "lever_y": ("lever", 1),
+    **{name: (name, None) for name in (*_NOISES, *(f"drive_angle_{of}" for of in _OF_ENCODER))},
+    **{f"lever_{axis}": ("lever", k) for k, axis in enumerate("xy")},
     **{f"{stem}_{name}": (stem, k) for stem in ("bias", "bias_uncertainty") for k, name in enumerate(CHANNELS)},
 }
 
@@ -102,15 +92,14 @@ def _like(first: LoadCell, rows: list[dict[str, float]], differ: set[str]) -> li
     noise."""
     cells = []
     for row in rows:
-        cell = object.__new__(LoadCell)
-        vars(cell).update(vars(first))
+        fields = dict(vars(first))
         for name in differ:
             field, place = _HARMLESS[name]
-            value = row[name]
-            if place is None:
-                vars(cell)[field] = value
-            else:
-                triple = getattr(cell, field)
-                vars(cell)[field] = (*triple[:place], value, *triple[place + 1 :])
+            if place is not None:
+                entries = list(fields[field])
+                entries[place] = row[name]
+            fields[field] = row[name] if place is None else tuple(entries)
+        cell = object.__new__(LoadCell)
+        vars(cell).update(fields)
         cells.append(cell)
     return cells

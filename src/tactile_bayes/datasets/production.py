@@ -15,10 +15,9 @@ from typing import Any
 from tactile_bayes.checks import check_path
 from tactile_bayes.datasets.card import CARD, card
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
-from tactile_bayes.datasets.shard import Written, file_in, shard_file, write_shard
-from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.shard import file_in, shard_file, write_shard
+from tactile_bayes.datasets.specification import UNNAMED, Specification, entries, meaning
 from tactile_bayes.datasets.specification_reading import read_specification
-from tactile_bayes.datasets.specification_text import UNNAMED, differences, meaning
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import (
     TaskProgress,
@@ -32,8 +31,6 @@ from tactile_bayes.tasks import (
 
 # Share of the time that is spent on the manifest: shards that it does not list when the run is killed are repeated.
 _WRITING_SHARE = 0.05
-
-
 _MOST_NAMED = 3  # largest number of differences between two specifications that a message names
 _LONGEST_VALUE = 60  # largest number of characters of a value in the message
 
@@ -95,29 +92,22 @@ def generate(
         manifest = _begun(spec, folder)
         done = {shard.file for shard in manifest.shards}
         tasks = [(spec.text, n, str(folder)) for n in range(spec.shards) if shard_file(n) not in done]
-        began, made, waiting = time.monotonic(), 0, list[Written]()
+        began, before = time.monotonic(), manifest.made
         next_write = began
-        before = sum(shard.records for shard in manifest.shards)
         try:
             with closing(run_tasks(write_shard, tasks, workers=workers)) as results:
                 for _, written in results:
-                    waiting.append(written)
-                    made += written.records
+                    manifest = manifest.having(written)
                     if (now := time.monotonic()) >= next_write:
-                        manifest, waiting = _noted(manifest, waiting, folder), []
+                        write_manifest(manifest, folder)
                         next_write = time.monotonic() + (time.monotonic() - now) / _WRITING_SHARE
                     if workers.progress is not None:
-                        workers.progress(TaskProgress(before + made, spec.records, made, time.monotonic() - began))
+                        made = manifest.made - before
+                        workers.progress(TaskProgress(manifest.made, spec.records, made, time.monotonic() - began))
         finally:
-            manifest = _noted(manifest, waiting, folder)
+            write_manifest(manifest, folder)
         _finish(spec, manifest, folder)
     return folder / MANIFEST
-
-
-def _noted(manifest: Manifest, written: list[Written], folder: Path) -> Manifest:
-    manifest = manifest.having(written)
-    write_manifest(manifest, folder)
-    return manifest
 
 
 def _finish(spec: Specification, manifest: Manifest, folder: Path) -> None:
@@ -130,21 +120,24 @@ def _finish(spec: Specification, manifest: Manifest, folder: Path) -> None:
 
 def _begun(spec: Specification, folder: Path) -> Manifest:
     """Return the manifest of the data set in a folder, without incomplete files."""
-    if not (folder / MANIFEST).exists():
-        strangers = [*folder.glob("shard-*.nc"), *folder.glob(CARD)]
-        if strangers:
-            raise SpecificationError(
-                f"{folder} holds {strangers[0].name}, but no {MANIFEST}: choose another folder, or empty this one, as "
-                "the same specification makes the same files again; or put a copy of the manifest back"
-            )
-        return _first(spec, folder)
-    manifest = read_manifest(folder)
+    shards, has_manifest = list(folder.glob("shard-*.nc")), (folder / MANIFEST).exists()
+    if not has_manifest and (strangers := [*shards, *folder.glob(CARD)]):
+        raise SpecificationError(
+            f"{folder} holds {strangers[0].name}, but no {MANIFEST}: choose another folder, or empty this one, as "
+            "the same specification makes the same files again; or put a copy of the manifest back"
+        )
+    manifest = read_manifest(folder) if has_manifest else Manifest.of(spec)
     if not manifest.shards:
-        return _first(spec, folder)
+        for file in shards:  # of an interrupted run
+            file.unlink()
+        manifest = Manifest.of(spec)
+        write_manifest(manifest, folder)
+        return manifest
     if manifest.specification_sha256 != spec.sha256:
         raise _other(manifest, spec, folder)
-    manifest = replace(manifest, shards=tuple(shard for shard in manifest.shards if _is_there(folder, shard)))
-    here = versions_here()
+    here, sizes = versions_here(), {path.name: path.stat().st_size for path in shards if path.is_file()}
+    kept = (shard for shard in manifest.shards if sizes.get(file_in(folder, shard.file).name) == shard.bytes)
+    manifest = replace(manifest, shards=tuple(kept))
     other = [f"{name} {was} (now {here.get(name)})" for name, was in manifest.versions.items() if here.get(name) != was]
     if other and not manifest.is_complete:
         raise SpecificationError(
@@ -154,38 +147,23 @@ def _begun(spec: Specification, folder: Path) -> Manifest:
     return manifest
 
 
-def _is_there(folder: Path, shard: Written) -> bool:
-    path = file_in(folder, shard.file)
-    return path.is_file() and path.stat().st_size == shard.bytes
-
-
-def _first(spec: Specification, folder: Path) -> Manifest:
-    """Write the first manifest; shards without a manifest are from an interrupted run and removed."""
-    for file in folder.glob("shard-*.nc"):
-        file.unlink()
-    manifest = Manifest.of(spec)
-    write_manifest(manifest, folder)
-    return manifest
-
-
 def _other(manifest: Manifest, spec: Specification, folder: Path) -> SpecificationError:
-    found = differences(meaning(manifest.specification), meaning(spec.text))
-    named = [f"{key} {_described(there)} there and {_described(here)} here" for key, there, here in found[:_MOST_NAMED]]
-    named += [f"{len(found) - _MOST_NAMED} more"] if len(found) > _MOST_NAMED else []
+    there, here = (entries(meaning(text)) for text in (manifest.specification, spec.text))
+    keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
+    named = [f"{key} {_described(there, key)} there and {_described(here, key)} here" for key in keys[:_MOST_NAMED]]
+    named += [f"{len(keys) - _MOST_NAMED} more"] if len(keys) > _MOST_NAMED else []
     name = "" if manifest.name == UNNAMED else f" ({manifest.name!r})"
     correction = "choose another folder, or give the specification that its manifest states"
-    if [key for key, _, _ in found] == ["records"]:
+    if keys == ["records"]:
         correction = "a data set does not grow: choose another folder, where the first records will be the same"
     return SpecificationError(
         f"{folder} holds a data set of another specification{name}, {', '.join(named)}: {correction}"
     )
 
 
-def _described(value: Any) -> str:
-    if value is None:
+def _described(said: Mapping[str, Any], key: str) -> str:
+    if key not in said:
         return "is left out"
-    if isinstance(value, dict) and "family" in value:
-        return f"is of family {value['family']!r}"
-    is_whole = isinstance(value, float) and value.is_integer()
-    text = str(int(value)) if is_whole else reprlib.repr(value)
+    value = said[key]
+    text = str(int(value)) if isinstance(value, float) and value.is_integer() else reprlib.repr(value)
     return f"is {text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + '…'}"

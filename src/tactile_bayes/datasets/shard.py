@@ -32,6 +32,7 @@ _LONGEST = 9  # largest number of phases in a sweep
 PHASE_SEQUENCES = tuple(
     "-".join("AB"[(start + k) % 2] for k in range(length)) for length in range(1, _LONGEST + 1) for start in (0, 1)
 )
+_EVENTS = {"first_contact": "first contact", "snap_off": "snap-off"}
 
 
 class Written(NamedTuple):
@@ -90,41 +91,21 @@ def _parsed(text: str) -> Specification:
 
 def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
     """Convert records to the dataset of a shard, with dimensions record, sweep and sample."""
-    variables: dict[str, Any] = {}
     families = [group.family for group in spec.groups]
-    variables["truth_family"] = ("record", records.family.astype(np.int16), _flags("family of the contour", families))
-    variables |= _parameters(spec, records)
-    for name, values in records.drawn.items():
-        if name.startswith("rod."):
-            entry = name.replace(".", "_")
-            unit = ROD_UNITS[name.removeprefix("rod.")]
-            unit = unit if spec.units == "SI" else _plain(unit)
-            variables[entry] = ("record", values, {"units": unit, "long_name": entry.replace("_", " ")})
-        elif name.startswith("load_cell."):
-            entry = name.removeprefix("load_cell.")
-            unit = LOAD_CELL_UNITS[entry] if spec.units == "SI" else _plain(LOAD_CELL_UNITS[entry])
-            long_name = f"load cell's {entry.replace('_', ' ')}"
-            variables[f"load_cell_{entry}"] = ("record", values, {"units": unit, "long_name": long_name})
-        elif name.startswith("unknown."):
-            parameter = parameter_named(name.removeprefix("unknown."))
-            assert parameter is not None
-            unit = parameter.unit if spec.units == "SI" else _plain(parameter.unit)
-            attrs_of = {"units": unit, "long_name": parameter.meaning}
-            variables[f"truth_{parameter.name}"] = ("record", values, attrs_of)
-    variables |= _of_sweeps(spec, records.sweep)
-    variables |= _of_samples(spec, records.sample)
-    coords: dict[str, Any] = {
+    variables: dict[str, Any] = {
+        "truth_family": ("record", records.family.astype(np.int16), _flags("family of the contour", families)),
+        **_parameters(spec, records),
+        **_of_rigs(spec, records.drawn),
+        **_of_sweeps(spec, records.sweep),
+        **_of_samples(spec, records.sample),
+    }
+    coords = {
         "record": ("record", records.index.astype(np.int64), {"long_name": "number of the record in the data set"}),
         "sweep": ("sweep", np.arange(spec.sweep_count), {"long_name": "number of the sweep in the record"}),
     }
-    attrs: dict[str, str | float] = {
-        "title": spec.name,
-        "units": spec.units,
-        "load_cell_frame": spec.frame,
-        **({} if spec.friction is None else {"friction": spec.friction}),
-        "specification_sha256": spec.sha256,
-    }
-    return xr.Dataset(variables, coords, attrs)
+    attrs = {"title": spec.name, "units": spec.units, "load_cell_frame": spec.frame}
+    known = {} if spec.friction is None else {"friction": spec.friction}
+    return xr.Dataset(variables, coords, {**attrs, **known, "specification_sha256": spec.sha256})
 
 
 def _flags(long_name: str, meanings: list[str] | tuple[str, ...], kind: Any = np.int16) -> dict[str, Any]:
@@ -156,6 +137,25 @@ def _unit(spec: Specification, name: str, entries: list[FamilyParameter]) -> str
     return units.pop() if len(units) == 1 and not (powers and name.endswith("_a")) else "see family"
 
 
+def _of_rigs(spec: Specification, drawn: Mapping[str, Floats]) -> dict[str, Any]:
+    """Numbers of rods and load cells, and deviations from what they state."""
+    found = {}
+    for key, values in drawn.items():
+        table, _, name = key.partition(".")
+        entry, words = f"{table}_{name}", name.replace("_", " ")
+        if table == "rod":
+            unit, long_name = ROD_UNITS[name], f"rod {words}"
+        elif table == "load_cell":
+            unit, long_name = LOAD_CELL_UNITS[name], f"load cell's {words}"
+        elif table == "unknown" and (parameter := parameter_named(name)) is not None:
+            entry, unit, long_name = f"truth_{name}", parameter.unit, parameter.meaning
+        else:
+            continue
+        unit = unit if unit == "rad" or spec.units == "SI" else "1"
+        found[entry] = ("record", values, {"units": unit, "long_name": long_name})
+    return found
+
+
 def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     backward, both = directions_of(spec, sweep), ("record", "sweep")
     attrs = _flags("sense of the drive", ("forward", "backward"), np.int8)
@@ -163,7 +163,6 @@ def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[s
     for name, values in sweep.items():
         if name == "direction":
             continue
-        key = name if name in COLUMNS else f"truth_{name}"
         if name == "phases":
             values = np.array([[PHASE_SEQUENCES.index(word) for word in row] for row in values], dtype=np.int8)
             attrs = _flags("phases of the contact in their order: A tip, B tangential", PHASE_SEQUENCES, np.int8)
@@ -175,13 +174,11 @@ def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[s
         elif name in COLUMNS:
             attrs = _described(spec, name)
         else:
-            event = "first_contact" if name.startswith("first_contact") else "snap_off"
+            event, words = next((e, w) for e, w in _EVENTS.items() if name.startswith(e))
             what = name.removeprefix(f"{event}_")
             attrs = _described(spec, "base_x" if what == "travel" else what)
-            if what == "travel":
-                attrs["long_name"] = "way of the base"
-            attrs["long_name"] += f" at {event.replace('_', ' ').replace('snap off', 'snap-off')}"
-        found[key] = (both, values, attrs)
+            attrs["long_name"] = f"{'way of the base' if what == 'travel' else attrs['long_name']} at {words}"
+        found[name if name in COLUMNS else f"truth_{name}"] = (both, values, attrs)
     return found
 
 
@@ -202,7 +199,3 @@ def _described(spec: Specification, name: str) -> dict[str, Any]:
     column = column_of(name)
     assert column is not None
     return {"units": column.unit_in(spec.units), "long_name": column.long_name_in(spec.frame)}
-
-
-def _plain(unit: str) -> str:
-    return unit if unit == "rad" else "1"

@@ -63,23 +63,22 @@ def record(
     (360, 'parabola', 0.02)
     """
     check_switch("truth", truth)
-    folder = None
+    manifest = None
     if not isinstance(source, Mapping | Specification):
-        path = check_path("source", source, "give a specification, its file, or the folder of a data set")
-        folder = path if path.is_dir() else None
-    if folder is not None:
-        manifest = read_manifest(folder)
+        folder = check_path("source", source, "give a specification, its file, or the folder of a data set")
+        manifest = read_manifest(folder) if folder.is_dir() else None
+    if manifest is not None:
         spec = read_text(manifest.specification)
     else:
         spec = source if isinstance(source, Specification) else read_specification(source)
     if isinstance(index, bool) or not isinstance(index, int | np.integer) or not 0 <= index < spec.records:
         raise ParameterError(f"there is no record {index!r}: they are numbered from 0 to {spec.records - 1}")
-    begin = int(index) - int(index) % spec.shard_records
-    if folder is not None:
+    if manifest is not None:
         data = opened(folder, manifest)
         if index not in data.indexes["record"]:
             raise SpecificationError(f"record {index} is not there yet: run dataset generate again")
     else:
+        begin = int(index) - int(index) % spec.shard_records
         records = generate_records(spec, begin, min(begin + spec.shard_records, spec.records))
         data = records_as_dataset(spec, records)
     return _as_record(spec, data.sel(record=index).load(), truth)
@@ -111,15 +110,12 @@ def contour_of(record: xr.Dataset) -> Contour:
     """
     check_kind("record", record, xr.Dataset, "give a record of a data set")
     family = FAMILIES.get(str(record.attrs.get("truth_family")))
-    if family is None:
-        raise ParameterError("the record's attributes name no contour: take it from a data set, with truth=True")
-    prefix = "truth_contour_"
-    if missing := [name for name in family.parameters if f"{prefix}{name}" not in record.attrs]:
+    names = [] if family is None else [f"truth_contour_{name}" for name in family.parameters]
+    if family is None or not all(name in record.attrs for name in names):
         raise ParameterError(
-            f"the record's attributes name a {family.name} without {prefix}{missing[0]}: if an earlier version made "
-            "it, take that version, or make its data set again with the parameters of today"
+            "the record's attributes name no contour with all its parameters: take it from a data set, with truth=True"
         )
-    return family.contour({name: record.attrs[f"{prefix}{name}"] for name in family.parameters})
+    return family.contour({name: record.attrs[f"truth_contour_{name}"] for name in family.parameters})
 
 
 def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset:
@@ -146,12 +142,9 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
     attrs |= {f"truth_{name}": float(data[f"truth_{name}"]) for name in spec.unknown}
     if not truth:
         attrs = {name: value for name, value in attrs.items() if not name.startswith("truth_")}
-    rod = None
-    if spec.rod:
-        names = ["flexural_rigidity" if name == "youngs_modulus" else name for name in spec.rod]
-        rod = Rod(**{name: float(data[f"rod_{name}"]) for name in names})
-    order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
-    known = {name: columns[name] for name in order if column_of(name) is not None}
+    names = ["flexural_rigidity" if name == "youngs_modulus" else name for name in spec.rod]
+    rod = Rod(**{name: float(data[f"rod_{name}"]) for name in names}) if names else None
+    known = {name: columns[name] for name in (*COLUMNS, *columns) if name in columns and column_of(name) is not None}
     return make_record(known, Rig(rod=rod, load_cell=LoadCell(frame=spec.frame)), attrs=attrs)
 
 

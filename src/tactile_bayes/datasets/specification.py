@@ -1,4 +1,4 @@
-"""The specification of a data set: contours, sweeps, load cell, and the number of records."""
+"""The specification of a data set: contours, sweeps, load cell and number of records; its text and its meaning."""
 
 from __future__ import annotations
 
@@ -7,17 +7,34 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Index
-from tactile_bayes.checks import check_switch
-from tactile_bayes.datasets.specification_text import meaning
+from tactile_bayes.contours.families import FAMILIES
+from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.datasets.variations import Variation
-from tactile_bayes.errors import SpecificationError
+from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.record import Frame
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
+UNNAMED = "unnamed"
+
+SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1}
+# Default values of keys; a specification with an explicit default is the same.
+DEFAULTS = {
+    "name": UNNAMED,
+    "description": "",
+    "shard_records": 500,
+    "precision": "double",
+    "each_contour": False,
+    "scan": SCAN,
+    "load_cell": {"frame": "fixed"},
+    "rod": {"diameter": 0.0},
+    "unknown": "nothing",
+}
 _AT_HAND = 2**14  # number of samples in a block: a column of them takes 128 kB
 
 
@@ -104,10 +121,6 @@ class Specification:
     frame: Frame
     single: bool
 
-    def __post_init__(self) -> None:
-        check_switch("each_group", self.each_group)
-        check_switch("single", self.single)
-
     @property
     def units(self) -> str:
         """ "SI" or "dimensionless"."""
@@ -129,9 +142,8 @@ class Specification:
         return self._may_have("taper") or "taper" in self.unknown
 
     def _may_have(self, name: str) -> bool:
-        """Return whether a quantity of the rod may differ from zero."""
-        distribution = self.rod.get(name)
-        return distribution is not None and (distribution.is_drawn or any(distribution.numbers))
+        said = self.rod.get(name)
+        return said is not None and (said.kind not in ("constant", "each") or any(said.numbers))
 
     @property
     def friction(self) -> float | None:
@@ -198,3 +210,63 @@ class Specification:
                     "lists that advance in step are equally long"
                 )
         return tuple(found.items())
+
+
+def meaning(text: str) -> dict[str, Any]:
+    """Return the meaning of the text of a specification.
+
+    It does not depend on comments, layout, the notation of numbers (1 or 1.0), or explicit default values."""
+    said = without(DEFAULTS, read_toml(text))
+    said["contours"] = [
+        without({"weight": 1.0, **left_out(FAMILIES[group["family"]])}, group) for group in said["contours"]
+    ]
+    return dict(canonical(said))
+
+
+def left_out(family: ContourFamily) -> dict[str, Any]:
+    """Default values of the parameters of a family: x_c = 0, and standard normal weights."""
+    standard = {"normal": [0.0, 1.0]}
+    return {
+        "x_c": 0.0,
+        **{n: standard for n, entry in family.table.items() if entry.prior and entry.prior.distribution == "norm"},
+    }
+
+
+def canonical(value: Any) -> Any:
+    """Return a TOML value with one kind of number."""
+    if isinstance(value, dict):
+        return {key: canonical(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [canonical(inner) for inner in value]
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53:
+        return float(value)
+    return value
+
+
+def without(defaults: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    """Remove keys with default values, and tables that contain no others."""
+    found = {}
+    for key, value in said.items():
+        default = defaults.get(key)
+        if isinstance(default, Mapping) and isinstance(value, Mapping):
+            value = without(default, value)
+            default = {}
+        if canonical(value) != canonical(default):
+            found[key] = value
+    return found
+
+
+def entries(said: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a canonical specification says by its keys, as `contours[0].q`; a distribution is one value."""
+    tables = {key: value for key, value in said.items() if isinstance(value, Mapping)}
+    tables |= {f"contours[{k}]": group for k, group in enumerate(said["contours"])}
+    found = {key: value for key, value in said.items() if key not in ("contours", *tables)}
+    return found | {f"{table}.{name}": value for table, inner in tables.items() for name, value in inner.items()}
+
+
+def toml_of(table: Mapping[str, Any]) -> str:
+    """Convert a mapping of numbers, words, lists and mappings to TOML, with inline values."""
+    try:
+        return "".join(f"{toml_key(str(key))} = {toml_value(value)}\n" for key, value in table.items())
+    except ParameterError as error:
+        raise SpecificationError(f"a specification cannot be written: {error}") from error

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from tactile_bayes.checks import (
-    as_number,
     check_choice,
     check_kind,
     check_number,
@@ -22,12 +20,11 @@ from tactile_bayes.checks import (
     check_whole_number,
     refused,
 )
-from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
+from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.datasets.deviations import deviations_of_table
-from tactile_bayes.datasets.specification import Drive, Group, Specification
-from tactile_bayes.datasets.specification_text import DEFAULTS, SCAN, left_out, toml_of
-from tactile_bayes.datasets.variations import Variation, variation_of
+from tactile_bayes.datasets.specification import DEFAULTS, SCAN, Drive, Group, Specification, left_out, toml_of
+from tactile_bayes.datasets.variations import Variation, quantity_of, variation_of
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
@@ -35,7 +32,7 @@ from tactile_bayes.mechanics.rods.rod import Rod, round_rigidity
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.spelling import look_alikes, refuse_unknown_keys
 from tactile_bayes.rig import Rig
-from tactile_bayes.rig.rig_file import ROD_UNITS, calibration_of, entries_of_cell, keys_of, number_in
+from tactile_bayes.rig.rig_file import ROD_UNITS, calibration_of, entries_of_cell, keys_of
 from tactile_bayes.rig.rig_file import TABLES as OF_RIG
 from tactile_bayes.tasks.documents import LARGEST, read_toml
 
@@ -49,14 +46,10 @@ _TABLES: Mapping[str, Iterable[str]] = {
     **{name: OF_RIG[name] for name in ("rod", "load_cell", "unknown", "calibration")},
 }
 _TRACED = ("shape", "rigidity_profile")  # what rig.toml states along a rod, and no data set draws
+# Beginnings of the entries of a load cell that may be negative.
+_SIGNED = ("bias_h", "bias_f", "gain_", "lever_", "moment_curve_", "correlation_", "drive_angle_o", "drive_angle_b")
 _OF_ROTATIONS = ("bases", "directions", "from_degrees", "to_degrees", "margin")
 _OF_TRANSLATIONS = ("base", "heading", "drive_angle", "turn", "travel", "step")
-
-# Parameters of earlier versions by family: the old one, the new one, and its meaning.
-_REPLACED = {
-    "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
-    "shape-free": ("radius", "r", "its mean (geometric) over slope angles"),
-}
 
 
 def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Specification:
@@ -86,24 +79,20 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
     >>> spec.shards, spec.units
     (1, 'dimensionless')
     """
-    folder = Path()
-    if isinstance(source, Mapping):
-        where = "specification"
-        try:
-            text = toml_of(_with_rig(source, folder))
-        except ParameterError as error:
-            raise SpecificationError(f"{where}: {error}") from error
-    else:
+    folder, where = Path(), "specification"
+    if not isinstance(source, Mapping):
         path = check_path("the specification", source, "give a file, like 'study.toml', or its content as a mapping")
-        where, folder = str(path), path.parent
-        try:
+        folder, where = path.parent, str(path)
+    try:
+        if isinstance(source, Mapping):
+            text = toml_of(_with_rig(source, folder))
+        else:
             with open(path, encoding="utf-8-sig") as file:
                 text = file.read(LARGEST + 1)
-        except UnicodeDecodeError as error:
-            raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error
-    try:
         return read_text(text, folder)
-    except SpecificationError as error:
+    except UnicodeDecodeError as error:
+        raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error
+    except ParameterError as error:
         raise SpecificationError(f"{where}: {error}") from error
 
 
@@ -218,7 +207,6 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
             f"flanks ({' or '.join(FLANKS)} on either side, as in 'parabola/circle')"
         )
     family = FAMILIES[name]
-    _refuse_replaced(group, name, key)
     # In the order in which numbers are drawn.
     names = sorted(family.parameters, key=lambda parameter: (parameter == "x_c", parameter.startswith("right_")))
     refuse_unknown_keys(group, ("family", "weight", *names), f"{key}.")
@@ -235,21 +223,6 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
     return Group(name, weight, distributions)
 
 
-def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
-    """Refuse parameters of earlier versions, and name the new ones."""
-    for side, flank in sides_of(name).items():
-        old, new, correction = _REPLACED.get(flank, ("", "", ""))
-        if not old or side + old not in group:
-            continue
-        a, n = as_number(group[side + old]), as_number(group.get(f"{side}n"))
-        if flank == "power-law" and a is not None and n is not None and a > 0.0 and n > 1.0:
-            correction += f", here {a ** (1.0 / (1.0 - n)):.12g}"
-        raise SpecificationError(
-            f"{key}.{side}{old} was a parameter of the family {flank} in earlier versions: write {side}{new} in its "
-            f"place, {correction}"
-        )
-
-
 def _refuse_no_contour(family: ContourFamily, distributions: Mapping[str, Variation], key: str) -> None:
     """Refuse parameters that are impossible for any values of the others, by the ends of the distributions; draws from
     unbounded distributions are tested later."""
@@ -262,8 +235,8 @@ def _refuse_no_contour(family: ContourFamily, distributions: Mapping[str, Variat
             try:
                 family.contour(possible | {name: np.full(1, number)})
             except ContourError as error:
-                verb = "is" if distribution.kind == "constant" else "may be"
-                raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
+                what = f"{key}.{name} {_may_be(distribution)} {number:g}"
+                raise SpecificationError(f"{what}: {rule_of(error)}") from error
 
 
 def _rod(rod: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
@@ -284,14 +257,13 @@ def _rod(rod: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
         )
     given = {"diameter": 0.0, **rod} if is_si else rod
     distributions = {
-        name: variation_of(given[name], f"rod.{name}", partial(number_in, unit=unit, name=f"rod.{name}", is_si=is_si))
-        for name, unit in ROD_UNITS.items()
-        if name in given
+        name: quantity_of(given[name], f"rod.{name}", unit, is_si) for name, unit in ROD_UNITS.items() if name in given
     }
-    signed, may_vanish = {"rest_curvature", "taper"}, {"diameter", "stem", "rest_curvature_deviation"}
-    _refuse_negative({name: of for name, of in distributions.items() if name not in signed}, "rod.", may_vanish)
-    if "taper" in distributions:
-        _refuse_taper(distributions["taper"])
+    for name, of in distributions.items():
+        if name != "rest_curvature":
+            most = STEEPEST_TAPER if name == "taper" else math.inf
+            may_vanish = name in ("taper", "diameter", "stem", "rest_curvature_deviation")
+            _refuse_outside(f"rod.{name}", of, 0.0, most, may_vanish)
     try:
         numbers = _at_share(distributions, 0.5)
         if "youngs_modulus" in numbers:
@@ -302,22 +274,9 @@ def _rod(rod: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
     return distributions
 
 
-def _refuse_taper(taper: Variation) -> None:
-    """Refuse tapers out of range."""
-    least, greatest = taper.least, taper.greatest
-    if not 0.0 <= least <= greatest <= STEEPEST_TAPER:
-        worst = least if least < 0.0 else greatest
-        verb, what = "is" if least == greatest else "may be", f"{worst:g}" if math.isfinite(worst) else "unbounded"
-        raise SpecificationError(
-            f"rod.taper {verb} {what}: give a number from 0, for none, to {STEEPEST_TAPER}, or a distribution within "
-            "these limits, as { uniform = [0.3, 0.7] }"
-        )
-
-
 def _load_cell(table: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
     distributions = {
-        name: variation_of(value, key, partial(number_in, unit=LOAD_CELL_UNITS[name], name=key, is_si=is_si))
-        for name, key, value in entries_of_cell(table)
+        name: quantity_of(value, key, LOAD_CELL_UNITS[name], is_si) for name, key, value in entries_of_cell(table)
     }
     if any(name.startswith("ornstein_uhlenbeck") for name in distributions):
         distributions.setdefault("ornstein_uhlenbeck_time", Variation("constant", (OrnsteinUhlenbeck().time,)))
@@ -326,18 +285,9 @@ def _load_cell(table: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
             LoadCell.from_entries(_at_share(distributions, share))
         except ParameterError as error:
             raise SpecificationError(f"load_cell: {error}") from error
-    signed = (
-        "bias_holding",
-        "bias_force",
-        "gain_",
-        "lever_",
-        "moment_curve_",
-        "correlation_",
-        "drive_angle_o",
-        "drive_angle_b",
-    )
-    unsigned = {name: distribution for name, distribution in distributions.items() if not name.startswith(signed)}
-    _refuse_negative(unsigned, "load_cell.", or_zero=set(unsigned))
+    for name, of in distributions.items():
+        if not name.startswith(_SIGNED):
+            _refuse_outside(f"load_cell.{name}", of, 0.0)
     return distributions
 
 
@@ -347,14 +297,17 @@ def _at_share(distributions: Mapping[str, Variation], share: float) -> dict[str,
     return {name: float(distribution.at(np.full(1, share), turn)[0]) for name, distribution in distributions.items()}
 
 
-def _refuse_negative(distributions: Mapping[str, Variation], prefix: str, or_zero: Container[str]) -> None:
-    for name, distribution in distributions.items():
-        low = distribution.least
-        if low < 0.0 or (low == 0.0 and name not in or_zero):
-            what = "negative" if low < 0.0 else "0"
-            raise SpecificationError(
-                f"{prefix}{name} may be {what}: choose a distribution of positive numbers, as log_normal"
-            )
+def _refuse_outside(key: str, of: Variation, least: float, most: float = math.inf, may_be_least: bool = True) -> None:
+    """Refuse a distribution with numbers out of range."""
+    for end in (of.least, of.greatest):
+        if not least <= end <= most or (end == least and not may_be_least):
+            what = "negative" if least == 0.0 > end else "unbounded" if math.isinf(end) else f"{end:g}"
+            limits = f"{'from' if may_be_least else 'above'} {least:g} to {most:g}"
+            raise SpecificationError(f"{key} {_may_be(of)} {what}: give numbers {limits}, as by uniform or log_normal")
+
+
+def _may_be(of: Variation) -> str:
+    return "is" if of.kind == "constant" else "may be"
 
 
 def _bases(value: Any) -> tuple[tuple[Variation, Variation], ...]:
@@ -400,17 +353,15 @@ def _translation(said: Mapping[str, Any], key: str) -> dict[str, Variation]:
     base = said["base"]
     if not isinstance(base, list) or len(base) != 2:
         raise refused(f"{key}.base", base, "give the place [x, y] where the base begins")
-    values = {
-        "base[0]": base[0],
-        "base[1]": base[1],
-        **{name: said[name] for name in _OF_TRANSLATIONS[1:] if name in said},
-    }
+    values = {"base[0]": base[0], "base[1]": base[1]}
+    values |= {name: said[name] for name in _OF_TRANSLATIONS[1:] if name in said}
     found = {name: variation_of(value, f"{key}.{name}") for name, value in values.items()}
     for name in ("heading", "drive_angle", "turn"):
         for angle in (found[name].least, found[name].greatest) if name in found else ():
             if math.isfinite(angle) and abs(angle) > 2.0 * math.pi:
                 raise SpecificationError(f"{key}.{name} may be {angle:g}: give angles in radians, at most a turn (2π)")
-    _refuse_negative({name: found[name] for name in ("travel", "step") if name in found}, f"{key}.", or_zero=())
+    for name in {"travel", "step"} & set(found):
+        _refuse_outside(f"{key}.{name}", found[name], 0.0, may_be_least=False)
     return found
 
 

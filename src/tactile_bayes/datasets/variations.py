@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_number, shown
 from tactile_bayes.distributions import KINDS, Distribution, distribution_of_table, in_words, open_share, support_of
 from tactile_bayes.errors import SpecificationError
+from tactile_bayes.rig.rig_file import number_in
 
 _WORDS = {"default": "the default of the rig", "calibrated": "as the calibration of the rig has found"}
 
@@ -31,10 +33,6 @@ class Variation:
     numbers: tuple[float, ...] = ()  # parameters of the kind; of scipy the finite ends of its support
     axis: str | None = None  # axis of a list
     of: Any = None  # frozen distribution of the kind "scipy"
-
-    @property
-    def is_drawn(self) -> bool:
-        return self.kind not in ("constant", "each")
 
     @property
     def least(self) -> float:
@@ -89,6 +87,11 @@ class Variation:
         return np.asarray(KINDS[self.kind].at(*self.numbers, share))
 
 
+def quantity_of(value: Any, key: str, unit: str, is_si: bool) -> Variation:
+    """Parse a distribution of a quantity, whose numbers may be texts with a unit; see `variation_of`."""
+    return variation_of(value, key, partial(number_in, unit=unit, name=key, is_si=is_si))
+
+
 def variation_of(value: Any, key: str, number: Callable[[Any], float | None] = as_number) -> Variation:
     """Parse the distribution that a value of a specification states; messages name it by `key`.
 
@@ -116,15 +119,14 @@ def variation_of(value: Any, key: str, number: Callable[[Any], float | None] = a
         return Variation("scipy", tuple(end for end in support_of(found) if math.isfinite(end)), of=found)
     if kind not in kinds:
         raise SpecificationError(f"{key} has the distribution {shown(kind)}, which is unknown: {hint}")
-    if kind in KINDS and KINDS[kind].size == 1 and not isinstance(stated, list):
-        stated = [stated]
-    numbers = [number(each) for each in stated] if isinstance(stated, list) else []
-    if not numbers or not all(each is not None and math.isfinite(each) for each in numbers):
-        raise SpecificationError(f"{key}.{kind} is {shown(stated)}: give a list of finite numbers")
-    if kind in KINDS and len(numbers) != KINDS[kind].size:
-        raise SpecificationError(f"{key}.{kind} has {len(numbers)} numbers: give {KINDS[kind].size}")
-    if kind in KINDS and not KINDS[kind].is_possible(*numbers):
-        raise SpecificationError(f"{key}.{kind} is {shown(stated)}: {KINDS[kind].rule}")
+    of = KINDS.get(kind)
+    listed = [stated] if of is not None and of.size == 1 and not isinstance(stated, list) else stated
+    numbers = [number(each) for each in listed] if isinstance(listed, list) else []
+    wanted = max(len(numbers), 1) if of is None else of.size
+    if len(numbers) != wanted or not all(each is not None and math.isfinite(each) for each in numbers):
+        raise SpecificationError(f"{key}.{kind} is {shown(stated)}: give a list of {wanted} finite numbers")
+    if of is not None and not of.is_possible(*numbers):
+        raise SpecificationError(f"{key}.{kind} is {shown(stated)}: {of.rule}")
     made = Variation(kind, tuple(each for each in numbers if each is not None), axis)
     with np.errstate(all="ignore"):
         ends = made.at(np.array([0.0, 1.0 - 2.0**-53]), np.zeros(2, dtype=np.intp))

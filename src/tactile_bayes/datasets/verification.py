@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from tactile_bayes.datasets.card import CARD
 from tactile_bayes.datasets.collection import read_shard
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
-from tactile_bayes.datasets.shard import file_in, records_as_dataset
+from tactile_bayes.datasets.shard import Written, file_in, records_as_dataset
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.errors import SpecificationError
@@ -63,13 +64,11 @@ def verify(
     manifest = read_manifest(folder)
     spec = read_text(manifest.specification)
     again = evenly_spread(len(manifest.shards), regenerate)
-    done, wanted = 0, len(manifest.shards) + again.size
+    done, wanted = count(1), len(manifest.shards) + again.size
 
     def note() -> None:
-        nonlocal done
-        done += 1
         if progress is not None:
-            progress(Verification(done, wanted))
+            progress(Verification(next(done), wanted))
 
     for shard in manifest.shards:
         _check(file_in(folder, shard.file), shard.sha256, shard.bytes)
@@ -83,10 +82,11 @@ def verify(
             f"{folder / strangers[0]} is not in the manifest: run dataset generate again, or delete it"
         )
     if not (manifest.is_complete and manifest.card_sha256):
-        have = sum(shard.records for shard in manifest.shards)
-        raise SpecificationError(f"{folder} has {have} of {manifest.records} records: run dataset generate again")
+        raise SpecificationError(
+            f"{folder} has {manifest.made} of {manifest.records} records: run dataset generate again"
+        )
     for number in again.tolist():
-        _compare(spec, manifest, folder, number)
+        _compare(spec, manifest, folder, manifest.shards[number])
         note()
     return manifest
 
@@ -100,19 +100,18 @@ def _check(file: Path, sha256: str, size: int | None = None) -> None:
         raise SpecificationError(f"{file} is not as it was written: delete it, and dataset generate makes it again")
 
 
-def _compare(spec: Specification, manifest: Manifest, folder: Path, number: int) -> None:
-    shard = manifest.shards[number]
+def _compare(spec: Specification, manifest: Manifest, folder: Path, shard: Written) -> None:
+    """Refuse a shard that differs when it is made again."""
+    path = folder / shard.file
     records = generate_records(spec, shard.first, shard.first + shard.records)
     again, stored = records_as_dataset(spec, records), read_shard(folder, shard)
     for name, variable in again.variables.items():
         if not (name in stored and np.array_equal(stored[name], variable, equal_nan=variable.dtype.kind == "f")):
+            versions = ", ".join(f"{library} {number}" for library, number in manifest.versions.items())
+            raise SpecificationError(f"{path}: {name} differs when it is made again (it was made with {versions})")
+    for name, number in records.counts.items():
+        if getattr(shard, name) != number:
             raise SpecificationError(
-                f"{folder / shard.file}: {name} differs when it is made again (it was made with "
-                f"{', '.join(f'{k} {v}' for k, v in manifest.versions.items())})"
-            )
-    for name, count in records.counts.items():
-        if getattr(shard, name) != count:
-            raise SpecificationError(
-                f"{folder / shard.file}: {name} is {count} when it is made again, and the manifest states "
-                f"{getattr(shard, name)}: put a copy of the manifest back"
+                f"{path}: {name} is {number} when it is made again, and the manifest states {getattr(shard, name)}: "
+                "put a copy of the manifest back"
             )
