@@ -88,13 +88,6 @@ def test_a_heading_decides_the_direction_record_by_record():
     assert [set(record(spec, i).direction.values) for i in range(2)] == [{"backward"}, {"forward"}]
 
 
-def test_backlash_follows_the_direction():
-    one = record(SI, 0)
-    wrong = one.drive_angle.values - one.truth_drive_angle.values
-    np.testing.assert_allclose(wrong, tb.LoadCell.from_record(one).misread(one.direction.values), atol=1e-14)
-    assert np.unique(wrong.round(9)).size == 2
-
-
 @pytest.mark.parametrize("spec", [CARRIED, changed(SI, precision="single")], ids=["double", "single"])
 def test_files_are_verified_and_inferred_from(spec, tmp_path):
     generate(spec, tmp_path / "set", workers=1)

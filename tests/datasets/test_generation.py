@@ -109,8 +109,6 @@ def test_fixed_drive_angles_and_bases_are_those():
     np.testing.assert_array_equal(data.base_y[:, 2:], -0.1)
 
 
-# ---- what is measured
-
 CELLS = {
     "white noise": {"moment_noise": {"log_normal": [0.02, 0.3]}, "force_noise": {"uniform": [0.02, 0.05]}},
     "everything": {
@@ -164,8 +162,6 @@ def test_readings_are_those_of_the_load_cell_that_the_record_states(frame, name)
         else:
             assert "truth_drive_angle" not in one
 
-
-# ---- what is drawn
 
 DISTRIBUTIONS = {
     "bias_force_x": ({"uniform": [-1.0, 3.0]}, stats.uniform(-1.0, 4.0)),
@@ -241,8 +237,6 @@ def test_lists_are_gone_through_together():
     np.testing.assert_array_equal(data.base_x.values[:, 0], np.tile(base.ravel(), 2))
 
 
-# ---- what is drawn again
-
 FAR = {
     "records": 60,
     "shard_records": 60,
@@ -313,9 +307,6 @@ def test_what_can_hardly_be_drawn_is_given_up_with_the_reason(change, message):
         generate_records(read_specification(spec), 0, spec["records"])
 
 
-# ---- what is not as one may wish
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("diameter", [0.05, 0.01])
 def test_records_whose_rod_is_strained_beyond_the_model_are_counted(diameter):
@@ -337,9 +328,6 @@ def test_records_whose_rod_is_strained_beyond_the_model_are_counted(diameter):
     assert (strained == 12) == (diameter == 0.05)
     stored = records_as_dataset(said, records).truth_largest_strain
     assert stored.dims == ("record", "sweep")
-
-
-# ---- what numbers follow from
 
 
 def test_records_depend_on_seed_and_index_alone():

@@ -45,18 +45,6 @@ def test_without_truth_nothing_of_it_is_left(made):
     assert tb.LoadCell.from_record(blind) == tb.LoadCell.from_record(record(folder, 5))
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".nc"])
-def test_it_goes_to_a_file_and_back(made, suffix, tmp_path):
-    _, folder = made
-    one = record(folder, 3)
-    tb.write_record(one, tmp_path / f"one{suffix}")
-    back = tb.read_record(tmp_path / f"one{suffix}")
-    xr.testing.assert_allclose(back, one)
-    assert tb.LoadCell.from_record(back) == tb.LoadCell.from_record(one)
-    angle = 0.1
-    np.testing.assert_allclose(contour_of(back).point(angle), contour_of(one).point(angle), rtol=1e-12)
-
-
 @pytest.mark.parametrize("limit", [0.15, 0.7, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_readings_at_the_end_of_the_range_are_there_also_from_32_bits(limit, tmp_path):
     """Which round 0.15 and 0.3 up, and 0.7 down."""

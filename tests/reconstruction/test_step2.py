@@ -13,7 +13,6 @@ from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
-from tactile_bayes.record import in_frame
 from tactile_bayes.rig import NOTHING, Rig, make_record
 from tactile_bayes.sweep import scan
 
@@ -52,9 +51,6 @@ def assert_statuses_tell_the_truth(contacts):
     assert ((phase == "none") == empty).all()
 
 
-# --- Without noise ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("base", "friction"), [((0.0, 0.0), 0.0), ((0.15, -0.05), 0.3)])
 @pytest.mark.parametrize("q", [0.5, *(pytest.param(q, marks=pytest.mark.slow) for q in (0.1, 0.8))])
 @pytest.mark.parametrize("profile", ["I", "II", "III", "IV"])
@@ -88,24 +84,12 @@ def test_what_identifies_a_sample_is_kept(swept):
         assert (contacts[name].values == swept[name].values).all()
 
 
-@pytest.mark.parametrize("rod", [None, WIRE])
-def test_forces_may_have_been_measured_in_the_turning_frame(rod):
-    record = scan(Parabola(2.5, 0.1) if rod else CONTOUR, rig=Rig(rod=rod), drive_step=0.1).record
-    contacts, turning = reconstruct(record), reconstruct(in_frame(record, "turning"))
-    assert (turning.status == contacts.status).all()
-    for name in NUMBERS:
-        np.testing.assert_allclose(turning[name], contacts[name], rtol=1e-10, atol=1e-12)
-
-
 def test_friction_that_is_left_out_turns_the_slope_by_its_angle():
     record = scan(Parabola(0.5, 0.3), rig=Rig(unknown={"friction": 0.3}), drive_step=0.1).record
     on = record.truth_contact_phase.values != "none"
     turn = (reconstruct(record).slope_angle - record.truth_slope_angle).values[on]
     side = np.where(record.direction.values[on] == "forward", 1.0, -1.0)
     np.testing.assert_allclose(turn, side * np.arctan(0.3), atol=1e-10)
-
-
-# --- What becomes of a sample -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -182,9 +166,6 @@ def test_no_sample_raises_and_none_is_silently_empty(loads, angle, direction, no
     assert_statuses_tell_the_truth(reconstruct(record, rig=Rig(load_cell=cell, unknown={"friction": friction})))
 
 
-# --- With noise ---------------------------------------------------------------------------------------------------
-
-
 def test_the_data_sheet_in_the_record_is_the_default(swept):
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(swept, rng=1)
     by_default = reconstruct(measured)
@@ -205,9 +186,6 @@ def test_unloaded_samples_are_taken_for_loaded_as_rarely_as_stated(missing):
         assert np.count_nonzero(reconstruct(measured).status.values != "no contact") == alarms
 
 
-# --- What is refused ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["holding_moment", "force_x", "force_y"])
 def test_a_missing_channel_is_refused(swept, name):
     with refused(RecordError, name):
@@ -217,9 +195,6 @@ def test_a_missing_channel_is_refused(swept, name):
 def test_a_rod_in_si_does_not_fit_a_dimensionless_record(swept):
     with refused(ParameterError, "dimensionless", WIRE):
         reconstruct(swept, rig=Rig(rod=WIRE))
-
-
-# --- Another rod --------------------------------------------------------------------------------------------------
 
 
 def test_a_rod_that_is_given_holds_against_the_one_stated():

@@ -57,8 +57,6 @@ def pick(record, phase, direction="forward"):
     return int(there[len(there) // 2])
 
 
-# --- Standard deviations against Monte Carlo ----------------------------------------------------------------------
-
 SI_NOISE = {"force_noise": 5.0 * SMALL * WIRE.force_unit, "moment_noise": 2.0 * SMALL * WIRE.moment_unit}
 SENSORS = {
     "white": ("plain", cell()),
@@ -180,9 +178,6 @@ def test_errors_that_samples_share_are_in_each(swept, method, kind):
             assert abs(found / float(stated[name]) - 1.0) < 4.5 / np.sqrt(2.0 * records), (phase, name)
 
 
-# --- The misfit ---------------------------------------------------------------------------------------------------
-
-
 def noisy_records(record, load_cell, count):
     return [load_cell.measure(record, rng=seed) for seed in range(count)]
 
@@ -244,9 +239,6 @@ def test_the_misfit_tells_of_a_rig_that_is_not_as_stated(contour, true, stated):
     assert 1e-4 < reconstruct(measured, method="constrained", rig=true).attrs["misfit_probability"] < 1.0 - 1e-4
 
 
-# --- Constrained against raw --------------------------------------------------------------------------------------
-
-
 def test_a_tip_contact_is_at_the_tip(swept):
     contacts = reconstruct(FAMILIAR.measure(swept, rng=1), method="constrained")
     tip = contacts.contact_phase.values == "tip"
@@ -254,9 +246,6 @@ def test_a_tip_contact_is_at_the_tip(swept):
     assert (contacts.contact_arclength.values[tip] == 1.0).all()
     assert (contacts.contact_arclength_sd.values[tip] == 0.0).all()
     assert (contacts.contact_arclength.values[contacts.contact_phase.values == "tangential"] <= 1.0).all()
-
-
-# --- What becomes of a sample -------------------------------------------------------------------------------------
 
 
 @METHODS
@@ -327,9 +316,6 @@ WITHOUT_VARIANCE = ["method='raw'", "degrees of freedom"]
 def test_the_constrained_method_needs_the_variance_of_every_channel(swept, load_cell, named):
     with refused(ParameterError, *named):
         reconstruct(swept, method="constrained", rig=Rig(load_cell=load_cell))
-
-
-# --- Mirrors and order --------------------------------------------------------------------------------------------
 
 
 # Relative agreement of the same sample told in other words: a search ends where its next gain is below 1e-12.

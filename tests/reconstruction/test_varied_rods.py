@@ -47,19 +47,6 @@ def test_a_scan_without_noise_gives_its_contacts_back(name, friction, method):
         np.testing.assert_allclose(found[truth].values[loaded][where], expected, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["arc", "tapered", "curved along it"])
-def test_an_si_record_states_all_that_step_2_takes(name):
-    bent = RODS[name].rest_curvature
-    bent = (lambda s, own=bent: 10.0 * own(10.0 * s)) if callable(bent) else 10.0 * bent
-    rod = tb.Rod(0.1, 1.2e-5, taper=RODS[name].taper, rest_curvature=bent)
-    record = tb.scan(
-        tb.contours.Circle(0.03, 0.05), rig=Rig(rod=rod), drive_step=np.radians(4.0), direction="forward"
-    ).record
-    found = tb.reconstruct(record, rig=Rig(load_cell=tb.LoadCell(force_noise=1e-12, moment_noise=1e-13)))
-    loaded = record["truth_contact_phase"].values != "none"
-    np.testing.assert_allclose(found["contact_x"].values[loaded], record["truth_contact_x"].values[loaded], atol=1e-10)
-
-
 @pytest.mark.parametrize("name", ["arc", pytest.param("tapered", marks=pytest.mark.slow)])
 def test_contact_posteriors_are_near_the_constrained_contacts(name):
     """Where errors are small and the edge is far: the mean of 1000 draws, and their spread."""

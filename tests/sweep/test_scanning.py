@@ -17,9 +17,6 @@ from tactile_bayes.sweep import equilibria, scan
 EPS = np.finfo(float).eps
 
 
-# --- equilibria ------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 @pytest.mark.parametrize(
     ("contour", "base"),
@@ -120,9 +117,6 @@ def test_a_thick_rod_is_a_thin_one_on_the_parallel_curve():
         )
 
 
-# --- events ----------------------------------------------------------------------------------------------------------
-
-
 def kinds(events):
     return [events.first_contact.kind, *(e.kind for e in events.transitions), events.snap_off.kind]
 
@@ -206,9 +200,6 @@ def test_profile_four_lets_go_at_its_vertex():
     assert (last.contact_x, last.contact_y) == (pytest.approx(0.0, abs=1e-13), pytest.approx(0.3, abs=1e-15))
 
 
-# --- the record ------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("base", [(0.0, 0.0), (0.15, -0.05)])
 @pytest.mark.parametrize("contour", [paper_profile("II", 0.5), paper_profile("IV", 0.3), Circle(0.2, 0.35)])
 def test_the_record(contour, base):
@@ -269,8 +260,6 @@ def test_grids_of_ones_own():
     empty = scan(contour, direction="forward", drive_angles=[-3.0, -2.9]).record
     assert np.all(empty.force_y == 0)
 
-
-# --- refusals --------------------------------------------------------------------------------------------------------
 
 II = paper_profile("II", 0.5)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.variations import Variation, quantity_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS
@@ -20,9 +21,6 @@ from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated, within_bounds
 from tactile_bayes.rig.unknown import DEFAULT, NOTHING, expanded, of_pivots
 from tactile_bayes.sweep import ManyUnits
-
-if TYPE_CHECKING:
-    from tactile_bayes.datasets.specification import Specification
 
 _DISCRETE = ("constant", "choice", "each")
 

@@ -85,7 +85,7 @@ def record(
 
 
 def contour_of(record: xr.Dataset) -> Contour:
-    """The true contour of a record of a data set, from its attributes.
+    """Return the true contour of a record of a data set, in metres if the record is SI, else in rod lengths.
 
     Parameters
     ----------
@@ -95,7 +95,6 @@ def contour_of(record: xr.Dataset) -> Contour:
     Returns
     -------
     Contour
-        In metres if the record is SI, else in rod lengths.
 
     Raises
     ------

@@ -67,14 +67,10 @@ class Specification:
 
     Attributes
     ----------
-    text : str
-        Text of the specification.
-    name, description : str
-        Name and description of the data set.
-    records, shard_records : int
-        Number of records in all, and in each file.
-    seed : int
-        Seed of the random numbers.
+    text, name, description : str
+        Text of the specification; name and description of the data set.
+    records, shard_records, seed : int
+        Number of records in all, and in each file; seed of the random numbers.
     groups : tuple of Group
         Families of contours.
     each_group : bool
@@ -82,9 +78,8 @@ class Specification:
     rod : mapping of str to Variation
         Numbers of `Rod`, of a dimensionless data set without length and flexural_rigidity; or youngs_modulus [N/m²].
     bases : tuple of (Variation, Variation)
-        Pivots (x, y) [m, or rod lengths].
+        Pivots (x, y) [m, or rod lengths], about each of which there are sweeps in all of the `directions`.
     directions : tuple of str
-        Directions of the sweeps about each pivot.
     translations : tuple of mapping of str to Variation
         Sweeps in which the base is carried along a line, in place of pivots: base[0], base[1], travel or step [m, or
         rod lengths], heading, drive_angle, and turn, the change of the drive angle on the way [rad].

@@ -92,7 +92,7 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
         return read_text(text, folder)
     except UnicodeDecodeError as error:
         raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error
-    except ParameterError as error:
+    except (ParameterError, SpecificationError) as error:
         raise SpecificationError(f"{where}: {error}") from error
 
 

@@ -60,7 +60,7 @@ class Event:
 
 @dataclass(frozen=True)
 class SweepEvents:
-    """Events of one sweep: first contact, changes of the phase, and snap-off.
+    """Events of one sweep.
 
     Attributes
     ----------
@@ -102,7 +102,6 @@ _PHASES = {True: "tip", False: "tangential"}
 
 
 def _change(before: ContactMode, after: ContactMode) -> str:
-    """Name of a change between two parts of a path."""
     if before.tip != after.tip:
         return f"{_PHASES[before.tip]} → {_PHASES[after.tip]}"
     return "stick" if after.sticks else f"slip {'right' if after.to_right else 'left'}"

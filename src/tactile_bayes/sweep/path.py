@@ -233,7 +233,6 @@ def _end(contour: Contour, at_right: bool) -> str:
 def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SweepFrame:
     """Convert one contour to the frame of a sweep of a rod about a pivot."""
     check_kind("the contour", contour, Contour, "give one, such as tb.contours.Parabola(a=0.5, q=0.5)")
-    check_kind("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
     check_choice("direction", direction, ("forward", "backward"))
     if contour.shape != ():
         raise ParameterError(

@@ -41,12 +41,8 @@ _TURN = 2.0 * math.pi
 
 class _ByDirection(dict[str, SweepEvents]):
     def __missing__(self, direction: str) -> SweepEvents:
-        have = ", ".join(map(repr, self))
-        hint = (
-            f"choose from {have}"
-            if have
-            else "there are several sweeps of a direction, so take scan.sweeps[number] instead"
-        )
+        several = "there are several sweeps of a direction, so take scan.sweeps[number] instead"
+        hint = f"choose from {', '.join(map(repr, self))}" if self else several
         raise ParameterError(f"the scan has no events of direction {direction!r}: {hint}")
 
 
@@ -106,9 +102,8 @@ def equilibria(
     direction : {"forward", "backward"}
         Sense of the drive: forward is counter-clockwise.
     rig : Rig, optional
-        Its rod, by default the dimensionless one, with the deviations that are known; friction is 0 unless it is known,
-        and at most 0.84. Friction acts as on a straight rod, which slides toward the
-        snap-off.
+        Its rod, by default the dimensionless one, with the deviations that are known; friction is 0 unless it is known.
+        It acts as on a straight rod, which slides toward the snap-off.
 
     Returns
     -------

@@ -97,13 +97,10 @@ def scan_many(
         return dims, values, column_attributes(name, system)
 
     both = ("contour", "sample")
-    samples = sweep_samples(paths, units, np.arange(count))
-    phase = np.array(PHASE_NAMES)[samples.pop("contact_phase")]
-    variables: dict[str, Any] = {"drive_angle": labelled(both, angles, "drive_angle")}
-    variables |= {name: labelled(both, values, name) for name, values in samples.items()}
-    variables["contact_phase"] = labelled(both, phase, "contact_phase")
-    statuses = np.array([one.message for one in Reachability])
-    variables["status"] = ("contour", statuses[paths.reach])
+    samples = {"drive_angle": angles, **sweep_samples(paths, units, np.arange(count))}
+    samples["contact_phase"] = np.array(PHASE_NAMES)[samples["contact_phase"]]
+    variables: dict[str, Any] = {name: labelled(both, values, name) for name, values in samples.items()}
+    variables["status"] = ("contour", np.array([one.message for one in Reachability])[paths.reach])
     variables["clear"] = ("contour", paths.is_clear())
     variables["phases"] = ("contour", np.array(phases_of(paths), dtype=np.str_))
     for event, columns in sweep_events(paths, units).items():
