@@ -6,15 +6,14 @@ from scipy import stats
 
 from helpers.data_sets import PLAIN, changed
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, Rod
 from tactile_bayes.datasets import generate, read_specification, record
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.rig.rig_prior import RigPrior
 

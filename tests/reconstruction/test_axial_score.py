@@ -5,12 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tactile_bayes import LoadCell, Rig, Rod, reconstruct, scan
 from tactile_bayes.contours import Parabola
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
 
 CONTOUR = Parabola(0.5, 0.5)
 TAPERED = Rod(diameter=0.02, taper=0.5)

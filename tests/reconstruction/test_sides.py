@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, make_record, reconstruct, scan
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.diagnostics.result_check import doubtful_sides
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import contact_sides, reconstruct, sides_and_doubts
-from tactile_bayes.rig import NOTHING, Rig, make_record
+from tactile_bayes.reconstruction import contact_sides, sides_and_doubts
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.runs.reconstruction import reconstruction_messages
-from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 

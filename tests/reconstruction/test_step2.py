@@ -8,13 +8,11 @@ from scipy.stats import binomtest
 
 import tactile_bayes as tb
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, Rod, make_record, reconstruct, scan
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
-from tactile_bayes.rig import NOTHING, Rig, make_record
-from tactile_bayes.sweep import scan
+from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples
+from tactile_bayes.rig import NOTHING
 
 NUMBERS = ("contact_x", "contact_y", "contact_arclength", "slope_angle")
 CONTOUR = Parabola(0.5, 0.5)

@@ -10,14 +10,11 @@ from scipy.stats import kstest
 
 from helpers.load_cells import GAIN, SHARED
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, Rod, make_record, reconstruct, scan
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.record import CHANNELS, in_frame
-from tactile_bayes.rig import Rig, make_record
-from tactile_bayes.sweep import scan
 
 METHODS = pytest.mark.parametrize("method", ["raw", "constrained"])
 PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")

@@ -1,4 +1,4 @@
-"""Drives that carry the base: values, scans, records and what follows from them."""
+"""Drives that carry the base: values, scans, the side that the rod touches, and records."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import pytest
 
 import tactile_bayes as tb
 from helpers.refusals import refused
+from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.record import carried_sweeps
 from tactile_bayes.rig import Rig
 
-CIRCLE = tb.contours.Circle(0.3, 0.8)
+CIRCLE = Circle(0.3, 0.8)
 THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
 BACK = tb.Translation(base=(-0.8, 0.0), heading=0.0, drive_angle=np.pi - 1.2, travel=1.6)
 RAISED = tb.Translation((0.0, -0.5), 0.5 * np.pi, 0.5 * np.pi, 1.0)
@@ -128,7 +129,7 @@ def test_step_2_brings_the_contacts_back(drive, rod):
 def test_lengths_are_in_metres_with_a_rod_in_si():
     rod = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
     drive = tb.Translation(base=(0.08, 0.0), heading=np.pi, drive_angle=1.2, travel=0.16)
-    scan = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rig=Rig(rod=rod))
+    scan = tb.scan(Circle(0.03, 0.08), drive=drive, rig=Rig(rod=rod))
     plain = tb.scan(CIRCLE, drive=THERE)
     np.testing.assert_allclose(scan.record.base_x, 0.1 * plain.record.base_x, atol=1e-15)
     np.testing.assert_allclose(scan.record.force_y, rod.force_unit * plain.record.force_y, rtol=1e-9, atol=1e-15)
@@ -171,7 +172,7 @@ def test_what_cannot_be_scanned_is_refused(error, arguments, values):
 
 @pytest.mark.parametrize("k", range(8))
 def test_a_released_rod_is_clear_however_its_last_touch_is_rounded(k):
-    contour = tb.contours.Circle(*(np.array([1.01660456, 0.38756071, -0.80086393]) * (1.0 + 1e-9 * k)))
+    contour = Circle(*(np.array([1.01660456, 0.38756071, -0.80086393]) * (1.0 + 1e-9 * k)))
     carried = tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8, 0.01)
     found = tb.scan(contour, drive=carried, rig=Rig(rod=tb.Rod(rest_curvature=0.4), unknown={"friction": 0.0177}))
     assert found.events["backward"].snap_off.kind == "release"
@@ -184,7 +185,7 @@ def test_a_tip_that_is_dragged_touches_with_the_side_to_which_it_is_turned(taper
     """Until that side lies along the contour: the tip never folds into the object."""
     heading, angle = (0.05, 1.0) if side > 0.0 else (np.pi - 0.05, np.pi - 1.0)
     drive = tb.Translation(base=(-0.87 * side, -0.06), heading=heading, drive_angle=angle, travel=2.5)
-    contour = tb.contours.Parabola(1.0, 0.65, 0.24 * side)
+    contour = Parabola(1.0, 0.65, 0.24 * side)
     scan = tb.scan(contour, drive=drive, rig=Rig(rod=tb.Rod(taper=taper)))
     assert scan.sweeps[0].direction == ("backward" if side > 0.0 else "forward")
     turn = (scan.record.truth_tip_angle - scan.record.truth_slope_angle).values
@@ -192,3 +193,40 @@ def test_a_tip_that_is_dragged_touches_with_the_side_to_which_it_is_turned(taper
     assert turn.size > 10
     assert turn.min() > -1e-9
     assert turn.max() < np.pi + 1e-9
+
+
+@pytest.mark.parametrize("contour", [Parabola(0.02, 0.8), PowerLaw(0.02, 2.5, 0.8)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_contact_goes_as_far_as_the_drive_carries_it(contour, side):
+    """Farther than the rod reaches from where it touches first."""
+    (sweep,) = tb.scan(contour, drive=tb.Motion([2.0 * side, 2.0 * side, -2.0 * side], [-0.3, 0.0, 0.0], 1.0)).sweeps
+    assert sweep.snap_off.kind == "release"
+    assert sweep.snap_off.contact_x == pytest.approx(-sweep.first_contact.contact_x, abs=1e-9)
+    assert abs(sweep.snap_off.contact_x) > 1.3
+
+
+@pytest.mark.parametrize("diameter", [0.0, 0.038])
+def test_a_contact_beyond_the_end_from_which_the_rod_comes_is_refused(diameter):
+    drive = tb.Motion([-0.835, -0.201], [-0.143, 0.207], 0.969)
+    with refused(ContourError, "beyond the contour's left end", "vertical"):
+        tb.scan(Circle(0.544, 0.203, 0.343), drive=drive, rig=Rig(rod=tb.Rod(diameter=diameter)))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_wall_is_touched_from_beside_the_object(side):
+    """Its other end faces away from the base."""
+    halves = [Parabola(2.0, 0.4, -0.3 * side), Parabola(1.0, -1.83, -1.7 * side)]
+    contour = Joined(*halves[:: int(side)], x=-0.2 * side)
+    heading, angle = (-2.12, 3.03) if side > 0.0 else (np.pi + 2.12, np.pi - 3.03)
+    (sweep,) = tb.scan(contour, drive=tb.Translation((1.75 * side, 3.4), heading, angle, 1.24)).sweeps
+    assert sweep.direction == ("backward" if side > 0.0 else "forward")
+    assert sweep.first_contact.kind == "tip"
+    x, y = sweep.first_contact.contact_x, sweep.first_contact.contact_y
+    assert y == pytest.approx(float(contour.height(x)), abs=1e-9)
+
+
+@pytest.mark.parametrize("angle", [-0.32, np.pi + 0.32])
+def test_a_drive_into_the_object_is_not_too_far_from_it(angle):
+    side = 1.0 if angle < 0.0 else -1.0
+    with refused(ContourError, "cuts the path"):
+        tb.scan(Circle(0.29, 0.32, -0.17 * side), drive=tb.Motion([-0.19 * side, 0.32 * side], [0.03, 1.9], angle))

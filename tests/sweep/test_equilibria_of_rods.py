@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from helpers.profiled_rods import given_rods
+from tactile_bayes import Rig, equilibria, scan
 from tactile_bayes.contours import Circle, paper_profile
 from tactile_bayes.errors import ClearanceWarning, ContourError
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import equilibria, scan
 
 RODS = given_rods()
 SLOW = ("cone", "parabolic", "tables")

@@ -15,11 +15,9 @@ from numpy.polynomial import chebyshev
 from scipy.optimize import root
 
 from helpers.profiled_rods import GivenRod, RodAlong, given_rod, integrated_pose
+from tactile_bayes import Rig, Rod, scan
 from tactile_bayes.contours import Circle, Contour, Parabola
 from tactile_bayes.errors import ClearanceWarning, ContourError, ReachError, StrainWarning
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
 from tactile_bayes.sweep.events import SweepEvents
 
 # Slope angles around a fold [rad], and how many: the remainder of the polynomial is below rounding errors.

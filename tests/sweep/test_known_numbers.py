@@ -7,16 +7,14 @@ import pytest
 from scipy import stats
 
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, Rod, Rotation, Translation, equilibria, scan, scan_many
 from tactile_bayes.contours import Circle
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS, bases_of
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
-from tactile_bayes.sweep import Rotation, Translation, equilibria, scan, scan_many
 
 NOT_SWEPT = {*GROUPS["gauge"], *GROUPS["discrepancy"], "moment_noise", "force_noise"}
 # In units of the rod.

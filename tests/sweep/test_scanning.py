@@ -7,12 +7,10 @@ from scipy.optimize import brentq
 from helpers.integration import shoot
 from helpers.legendre import equilibrium, tangential_arclength
 from helpers.refusals import refused
+from tactile_bayes import Rig, Rod, equilibria, scan
 from tactile_bayes.contours import Circle, Parabola, from_function, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import equilibria, scan
 
 EPS = np.finfo(float).eps
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from helpers.refusals import refused
-from tactile_bayes import Rod, scan
+from tactile_bayes import Rig, Rod, scan
 from tactile_bayes.contours import (
     Circle,
     Ellipse,
@@ -20,7 +20,6 @@ from tactile_bayes.contours import (
 )
 from tactile_bayes.errors import ClearanceWarning, ContourError, ParameterError, StrainWarning
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import Rig
 
 
 def test_several_bases_are_the_single_ones_in_one_record():

@@ -28,6 +28,7 @@ from tactile_bayes.rig.parameters import parameter_named
 from tactile_bayes.rig.rig_file import ROD_UNITS
 from tactile_bayes.tasks import write_atomically
 
+_parsed = lru_cache(maxsize=1)(read_text)
 _LONGEST = 9  # largest number of phases in a sweep
 PHASE_SEQUENCES = tuple(
     "-".join("AB"[(start + k) % 2] for k in range(length)) for length in range(1, _LONGEST + 1) for start in (0, 1)
@@ -82,11 +83,6 @@ def _sha256(content: Iterable[memoryview]) -> str:
     for part in content:
         digest.update(part)
     return digest.hexdigest()
-
-
-@lru_cache(maxsize=1)
-def _parsed(text: str) -> Specification:
-    return read_text(text)
 
 
 def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
