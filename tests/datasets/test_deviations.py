@@ -5,14 +5,13 @@ import pytest
 from scipy import stats
 
 from helpers.data_sets import PLAIN, changed
+from helpers.expected_readings import assert_expected
 from helpers.refusals import refused
 from tactile_bayes import LoadCell, Rig, Rod
 from tactile_bayes.datasets import generate, read_specification, record
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.rig.rig_prior import RigPrior
@@ -61,20 +60,9 @@ def test_readings_are_those_that_inference_expects_at_the_truth(said, frame):
     for number in (0, 3):
         one = record(spec, number)
         truth = {k.removeprefix("truth_").removeprefix("contour_"): v for k, v in one.attrs.items() if k[:5] == "truth"}
-        cell = LoadCell.from_record(one) or LoadCell()
-        noisy = LoadCell.from_entries({**cell.entries(), "force_noise": 1.0, "moment_noise": 1.0})
-        model = Experiment(one, Rig(load_cell=noisy, unknown=said), "circle").model
-        model.likelihood.exact = True
         assert {name for name, value in said.items() if value == "default" and name != "base"} <= set(truth)
-        point = np.array([[{**truth, "noise_scale": 1.0}[name] for name in model.names]])
-        loads, reached = model.likelihood.predict(model.contours(point), model.rig(point))
-        own = model.likelihood.load_cell
-        sensed = model.unknowns.sensed(loads, model.values(point), own)
-        expected = own.expected(sensed)[0] * model.likelihood.rod.load_units
-        assert reached.all()
-        readings = np.stack([one[name].values for name in CHANNELS], axis=1)
-        largest = np.abs(expected).max(axis=0)
-        np.testing.assert_allclose(readings / largest, expected / largest, rtol=0, atol=1e-6)
+        rig = Rig(load_cell=LoadCell.from_record(one) or LoadCell(), unknown=said)
+        assert_expected(one, rig, truth, 1e-6)
 
 
 def test_numbers_are_known_and_distributions_are_drawn():

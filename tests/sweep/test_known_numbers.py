@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.expected_readings import assert_expected
 from helpers.refusals import refused
 from tactile_bayes import LoadCell, Rig, Rod, Rotation, Translation, equilibria, scan, scan_many
 from tactile_bayes.contours import Circle
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.record import CHANNELS, bases_of
+from tactile_bayes.record import bases_of
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 
@@ -86,21 +86,6 @@ def scaled(length: float, rigidity: float):
     return whole, cell, contour, bases, {name: value * units[name] for name, value in KNOWN.items()}
 
 
-def expected(record, rig, contour):
-    """Readings that inference expects of this rig, and its own rod's units."""
-    noisy = replace(rig.load_cell, force_noise=1.0, moment_noise=1.0)
-    rig = replace(rig, load_cell=noisy, unknown={"noise_scale": 1.0, **rig.entries})
-    model = Experiment(record, rig, "circle").model
-    model.likelihood.exact = True
-    point = np.array([[getattr(contour, name) for name in ("r", "q", "x_c")]])
-    assert model.names == ("r", "q", "x_c")
-    loads, reached = model.likelihood.predict(model.contours(point), model.rig(point))
-    assert reached.all()
-    own = model.likelihood.load_cell
-    sensed = model.unknowns.sensed(loads, model.values(point), own)
-    return own.expected(sensed)[0] * model.likelihood.rod.load_units
-
-
 def test_numbers_of_all_parameters_are_tried():
     assert {name for name in KNOWN if not name.startswith("base")} == set(PARAMETERS) - NOT_SWEPT
 
@@ -116,10 +101,7 @@ def test_a_scan_that_is_read_is_what_inference_expects(name, length):
     record = rig.measure(swept.record, rng=1)
     assert record.attrs["units"] == ("SI" if length else "dimensionless")
     np.testing.assert_allclose(bases_of(record), bases, rtol=0, atol=1e-15)
-    readings = np.stack([record[channel].values for channel in CHANNELS], axis=1)
-    should = expected(record, rig, contour)
-    largest = np.abs(should).max(axis=0)
-    np.testing.assert_allclose(readings / largest, should / largest, rtol=0, atol=1e-9)
+    assert_expected(record, rig, vars(contour), 1e-9)
 
 
 def test_many_scans_and_equilibria_yield_too():
@@ -176,10 +158,7 @@ def test_a_plan_has_known_numbers():
     plan = Plan(
         contour, Rig(rod, replace(cell, **noises), said), drive=[Rotation(base, drive_step=0.1) for base in bases]
     )
-    should = expected(plan.record, plan.rig, contour)
-    readings = np.stack([plan.record[channel].values for channel in CHANNELS], axis=1)
-    largest = np.abs(should).max(axis=0)
-    np.testing.assert_allclose(readings / largest, should / largest, rtol=0, atol=1e-9)
+    assert_expected(plan.record, plan.rig, vars(contour), 1e-9)
     contacts = plan.reconstruct(plan.record, "raw")
     sure = (contacts.status == "ok").values & (plan.record.truth_contact_phase != "none").values
     assert sure.sum() > 20
