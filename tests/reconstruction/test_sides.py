@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy import stats
 
-from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, make_record, reconstruct, scan
+from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, reconstruct, scan
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola, paper_profile
@@ -58,17 +59,8 @@ def test_a_drive_that_turns_back_in_contact_stays_on_its_side():
     record = scan(paper_profile("II", q=0.5), direction="forward", drive_step=0.02).record
     there = record.isel(sample=slice(0, 100))
     back = there.isel(sample=slice(None, None, -1))
-    loads = ["holding_moment", "force_x", "force_y"]
-    both = {name: np.concatenate([there[name].values, back[name].values]) for name in [*loads, "drive_angle"]}
-    count = there.sizes["sample"]
-    columns = {
-        "sweep": np.repeat([0, 1], count),
-        "direction": np.repeat(["forward", "backward"], count),
-        "base_x": np.zeros(2 * count),
-        "base_y": np.zeros(2 * count),
-        **both,
-    }
-    measured = CELL.measure(make_record(columns), rng=1)
+    back = back.assign(sweep=back.sweep + 1, direction=("sample", np.full(100, "backward")))
+    measured = CELL.measure(xr.concat([there, back], "sample"), rng=1)
     assert np.all(contact_sides(measured, CELL) == 1.0)
 
 

@@ -108,12 +108,10 @@ def test_each_status_is_reached(swept, loads, status, direction):
     good = swept.isel(sample=swept.direction.values == direction)
     good = good.drop_vars([name for name in good.data_vars if name.startswith("truth_")])
     good["sweep"][:] = 0
-    mirror = direction == "backward"
-    moment, force_x, force_y = loads
+    sign, angle = (1.0, 1.2) if direction == "forward" else (-1.0, np.pi - 1.2)
     table = {name: good[name].values for name in good.data_vars}
-    angle = np.pi - 1.2 if mirror else 1.2
-    place = int(np.searchsorted(-table["drive_angle"] if mirror else table["drive_angle"], -angle if mirror else angle))
-    sign = -1.0 if mirror else 1.0
+    place = int(np.searchsorted(sign * table["drive_angle"], sign * angle))
+    moment, force_x, force_y = loads
     row = {"sweep": 0, "direction": direction, "base_x": 0.0, "base_y": 0.0, "drive_angle": angle}
     row |= {"holding_moment": sign * moment, "force_x": sign * force_x, "force_y": force_y}
     mixed = make_record({name: np.insert(values, place, row[name]) for name, values in table.items()})

@@ -73,7 +73,7 @@ def card(spec: Specification, manifest: Manifest) -> str:
         size=sum(shard.bytes for shard in manifest.shards) / 1e6,
         units=units,
         rows="\n".join(f"| {quantity} | {distribution} |" for quantity, distribution in _rows(spec)),
-        draws="\n\n".join([*_in_turn(spec), _redrawn(spec, manifest), *_to_beware_of(spec, manifest)]),
+        draws="\n\n".join(_draws(spec, manifest)),
         bits=32 if spec.single else 64,
         not_stored="".join(f"{sentence}\n\n" for sentence in _not_in_the_files(spec)),
         seed=spec.seed,
@@ -126,36 +126,29 @@ def _names(spec: Specification) -> list[str]:
     ]
 
 
-def _in_turn(spec: Specification) -> list[str]:
-    """Describe the order in which the lists are used."""
-    if not spec.lists:
-        return []
-    times = spec.records // spec.combinations
-    often = "once" if times == 1 else f"{times} times"
-    names = []
-    for name, _ in spec.lists:
-        in_step = " and ".join(key for key, distribution in spec.distributions if distribution.axis == name)
-        names.append(f"{name} ({in_step} in step)" if in_step else name)
-    if len(names) == 1:
-        return [f"Records go through the {spec.combinations} entries of {names[0]}, {often}."]
-    return [
-        f"Records go through all {spec.combinations} combinations of the lists, {often}, the last of these fastest: "
-        f"{'; '.join(names)}."
-    ]
-
-
-def _redrawn(spec: Specification, manifest: Manifest) -> str:
-    """Describe the number of rejected draws, and their effect on the distributions."""
-    whatever = "" if spec.drive.begin is None else ", driven far enough, reaches, whatever the drive angles above,"
-    reached = f"that every sweep{whatever or ' reaches'} and that the rod is clear of after snap-off"
-    if not (total := sum(manifest.redrawn.values())):
-        return f"Every contour drawn is one {reached}."
+def _draws(spec: Specification, manifest: Manifest) -> Iterator[str]:
+    """Describe the order of lists, the rejected draws and their effect, and records that may not be suitable."""
+    if spec.lists:
+        times = spec.records // spec.combinations
+        often = "once" if times == 1 else f"{times} times"
+        names = []
+        for name, _ in spec.lists:
+            in_step = " and ".join(key for key, distribution in spec.distributions if distribution.axis == name)
+            names.append(f"{name} ({in_step} in step)" if in_step else name)
+        every = f"the {spec.combinations} entries of {names[0]}, {often}."
+        if len(names) > 1:
+            every = f"all {spec.combinations} combinations of the lists, {often}, the last of these fastest: "
+            every += f"{'; '.join(names)}."
+        yield f"Records go through {every}"
+    whatever = (
+        " reaches" if spec.drive.begin is None else ", driven far enough, reaches, whatever the drive angles above,"
+    )
+    reached = f"that every sweep{whatever} and that the rod is clear of after snap-off"
     why = ", ".join(f"{count} {reason}" for reason, count in sorted(manifest.redrawn.items()))
-    return f"{total} contours were drawn again ({why}), so the distributions above hold among contours {reached}."
-
-
-def _to_beware_of(spec: Specification, manifest: Manifest) -> Iterator[str]:
-    """Describe records that may not be suitable."""
+    if total := sum(manifest.redrawn.values()):
+        yield f"{total} contours were drawn again ({why}), so the distributions above hold among contours {reached}."
+    else:
+        yield f"Every contour drawn is one {reached}."
     if manifest.untouched or spec.drive.begin is not None:
         sweeps = spec.records * spec.sweep_count
         yield f"Of {sweeps} sweeps, {manifest.untouched} have no sample in contact (`truth_contact_phase`)."

@@ -22,7 +22,6 @@ from tactile_bayes.datasets.drives import Drives, drives_of
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import rule_of
-from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import Reachability
@@ -36,6 +35,7 @@ _AT_ONCE = 500
 # Distance in the random stream between two draws of a record: far more than the number of distributions, so that a
 # contour does not depend on what is drawn after it.
 _APART = 2**20
+_CONTOUR, _NOISE = 0, 1  # purposes of random numbers: the distributions of a specification, and the load cell
 _GOOD = Reachability.TOUCHES.message
 
 
@@ -100,7 +100,8 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
     index = np.arange(begin, end)
     drawn = {key: np.full(index.size, np.nan) for key in spec.numbers}
     records = Records(index, np.zeros(index.size, dtype=np.intp), drawn, {}, {}, Counter())
-    uniform, turns = streams(spec.seed, index, CONTOUR), _turns(spec, index)
+    uniform, noise = (_streams(spec.seed, index, purpose) for purpose in (_CONTOUR, _NOISE))
+    turns = _turns(spec, index)
     in_vain: list[tuple[Index, NDArray[Any]]] = []
     left, draws, ahead = np.arange(index.size), 0, 1
     while left.size:
@@ -118,8 +119,14 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         left, draws = left[~is_good.any(axis=1)], draws + ahead
         ahead = max(1, min(2 * ahead, max(_AT_ONCE, index.size) // max(left.size, 1), _MOST_DRAWS - draws))
     _state_pivots(spec, records)
-    measure(spec, index, as_built(spec, records.drawn), records.sample, directions_of(spec, records.sweep))
+    measure(spec, noise, as_built(spec, records.drawn), records.sample, directions_of(spec, records.sweep))
     return records
+
+
+def _streams(seed: int, records: Index, purpose: int) -> list[np.random.Generator]:
+    """Return the random numbers of records for a purpose, which depend on the seed and the record's number only."""
+    seeds = (np.random.SeedSequence(seed, spawn_key=(record, purpose)) for record in records.tolist())
+    return [np.random.Generator(np.random.PCG64(one)) for one in seeds]
 
 
 def _state_pivots(spec: Specification, records: Records) -> None:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.datasets.deviations import drifts_of
 from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.datasets.streams import NOISE, Together, streams
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed
@@ -27,25 +26,41 @@ _HARMLESS: dict[str, tuple[str, int | None]] = {
 }
 
 
+class Together:
+    """Many generators with the interface of one: the first axis of the result runs over them."""
+
+    def __init__(self, generators: list[np.random.Generator]) -> None:
+        self._generators = generators
+
+    def standard_normal(self, shape: tuple[int, ...]) -> Floats:
+        return np.stack([one.standard_normal(shape[1:]) for one in self._generators])
+
+    def chisquare(self, degrees_of_freedom: float, shape: tuple[int, ...]) -> Floats:
+        return np.stack([one.chisquare(degrees_of_freedom, shape[1:]) for one in self._generators])
+
+
 def measure(
     spec: Specification,
-    index: Index,
+    noise: list[np.random.Generator],
     built: Mapping[str, Floats],
     sample: dict[str, NDArray[Any]],
     backward: NDArray[np.int8],
 ) -> None:
-    """Add the readings of load cells as they are built to the true values; directions are 0 forward, 1 backward."""
+    """Add the readings of load cells as they are built to the true values, each record with random numbers of its own.
+
+    Directions are 0 forward, 1 backward.
+    """
+    count = len(noise)
     columns = {key.removeprefix("load_cell."): v for key, v in built.items() if key.startswith("load_cell.")}
-    cells, cell_of, scale = _cells(columns, index.size)
-    scale *= built.get("unknown.noise_scale", np.ones(index.size))[:, None]
-    drifts = drifts_of(built, index.size)
-    noise = streams(spec.seed, index, NOISE)
-    direction = np.array(["forward", "backward"])[np.broadcast_to(backward, (index.size, spec.sweep_count))][..., None]
+    cells, cell_of, scale = _cells(columns, count)
+    scale *= built.get("unknown.noise_scale", np.ones(count))[:, None]
+    drifts = drifts_of(built, count)
+    direction = np.array(["forward", "backward"])[np.broadcast_to(backward, (count, spec.sweep_count))][..., None]
     encoder = any(name.startswith("drive_angle") for name in columns)
     if encoder:
         sample["truth_drive_angle"] = sample["drive_angle"].copy()
     sample |= {name: np.empty_like(sample["drive_angle"]) for name in CHANNELS}
-    for rows in spec.blocks(index.size):
+    for rows in spec.blocks(count):
         loads = np.stack([sample[f"truth_{name}"][rows] for name in CHANNELS], axis=-1)
         if spec.frame == "turning":
             loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], sample["drive_angle"][rows])

@@ -299,7 +299,7 @@ def _at_share(distributions: Mapping[str, Variation], share: float) -> dict[str,
 
 def _refuse_outside(key: str, of: Variation, least: float, most: float = math.inf, may_be_least: bool = True) -> None:
     """Refuse a distribution with numbers out of range."""
-    for end in (of.least, of.greatest):
+    for end in of.ends:
         if not least <= end <= most or (end == least and not may_be_least):
             what = "negative" if least == 0.0 > end else "unbounded" if math.isinf(end) else f"{end:g}"
             limits = f"{'from' if may_be_least else 'above'} {least:g} to {most:g}"
@@ -357,7 +357,7 @@ def _translation(said: Mapping[str, Any], key: str) -> dict[str, Variation]:
     values |= {name: said[name] for name in _OF_TRANSLATIONS[1:] if name in said}
     found = {name: variation_of(value, f"{key}.{name}") for name, value in values.items()}
     for name in ("heading", "drive_angle", "turn"):
-        for angle in (found[name].least, found[name].greatest) if name in found else ():
+        for angle in found[name].ends if name in found else ():
             if math.isfinite(angle) and abs(angle) > 2.0 * math.pi:
                 raise SpecificationError(f"{key}.{name} may be {angle:g}: give angles in radians, at most a turn (2π)")
     for name in {"travel", "step"} & set(found):

@@ -35,24 +35,15 @@ class Variation:
     of: Any = None  # frozen distribution of the kind "scipy"
 
     @property
-    def least(self) -> float:
-        """Least possible number; for log_normal, which is always positive, the median."""
-        if self.kind == "normal" and self.numbers[1]:
-            return -math.inf
-        if self.kind in ("half_normal", "scipy"):
-            return 0.0 if self.of is None else support_of(self.of)[0]
-        return self.numbers[0] if self.kind in ("normal", "log_normal") else min(self.numbers)
-
-    @property
-    def greatest(self) -> float:
-        """Greatest possible number."""
-        if self.kind in ("normal", "log_normal"):
-            return math.inf if self.numbers[1] else self.numbers[0]
-        if self.kind == "half_normal":
-            return math.inf if self.numbers[0] else 0.0
+    def ends(self) -> tuple[float, float]:
+        """Least and greatest possible number; for log_normal, which is always positive, the median is the least."""
         if self.kind == "scipy":
-            return support_of(self.of)[1]
-        return max(self.numbers)
+            return support_of(self.of)
+        if self.kind in ("normal", "log_normal", "half_normal") and self.numbers[-1]:
+            least = {"normal": -math.inf, "log_normal": self.numbers[0], "half_normal": 0.0}
+            return least[self.kind], math.inf
+        numbers = self.numbers[:1] if self.kind in ("normal", "log_normal") else self.numbers
+        return min(numbers), max(numbers)
 
     @property
     def text(self) -> str:

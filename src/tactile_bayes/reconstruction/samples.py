@@ -82,13 +82,11 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         if frame_of(measured) == "turning":
             loads[:, 1], loads[:, 2] = turned(loads[:, 1], loads[:, 2], -angle)
             leaning[:, 1], leaning[:, 2] = -loads[:, 2], loads[:, 1]
-        if has_noise and frame_of(measured) == "turning":
             turn = to_fixed_axes(angle)
             covariance = turn @ covariance @ np.swapaxes(turn, 1, 2)
         angle = angle - suspension_compliance * rod.moment_unit * loads[:, 0]
     signs = np.where(side[:, None] < 0.0, _MIRROR, 1.0)
-    if has_noise:
-        covariance = signs[:, :, None] * covariance * signs[:, None, :]
+    covariance = signs[:, :, None] * covariance * signs[:, None, :]
     reading = Reading(
         np.where(side < 0.0, np.pi - angle, angle),
         signs * loads,
