@@ -18,17 +18,12 @@ from tactile_bayes.rig.rig_prior import RigPrior
 
 FALSE_ALARM = 1e-4
 CIRCLE = {"family": "circle", "r": {"uniform": [0.04, 0.06]}, "q": {"uniform": [0.05, 0.06]}}
+WIRE = {"diameter": "0.2 mm", "youngs_modulus": "200 GPa"}
 SI = {
     "records": 6,
     "seed": 5,
     "contours": [CIRCLE],
-    "rod": {
-        "length": {"uniform": ["100 mm", "110 mm"]},
-        "diameter": "0.2 mm",
-        "youngs_modulus": "200 GPa",
-        "taper": 0.1,
-        "stem": 0.004,
-    },
+    "rod": {**WIRE, "length": {"uniform": ["100 mm", "110 mm"]}, "taper": 0.1, "stem": 0.004},
     "scan": {"samples": 40, "bases": [[0.0, 0.0], [0.01, 0.003]]},
     "load_cell": {
         "frame": "turning",
@@ -51,9 +46,10 @@ def unknown_but(name):
     return {**dict.fromkeys(EVERY, "default"), "base": "default", name: PARAMETERS[name].neutral or 0.0}
 
 
-@pytest.mark.parametrize(
-    "said", [unknown_but("friction"), unknown_but("rest_curvature"), {}], ids=["free", "straight", "usual"]
-)
+SAID = {"free": unknown_but("friction"), "straight": unknown_but("rest_curvature"), "usual": {}}
+
+
+@pytest.mark.parametrize("said", SAID.values(), ids=SAID)
 @pytest.mark.parametrize("frame", ["fixed", "turning"])
 def test_readings_are_those_that_inference_expects_at_the_truth(said, frame):
     spec = changed(SI, unknown=said, load_cell__frame=frame)

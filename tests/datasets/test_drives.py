@@ -26,20 +26,13 @@ CARRIED = changed(
     contours=[{"family": "circle", "r": {"uniform": [0.4, 0.6]}, "q": {"uniform": [0.6, 0.7]}}],
     scan={"samples": 40, "translations": [FIRST, SECOND]},
 )
+NEAR, OTHER = {**FIRST, "base": [0.09, 0.0], "travel": 0.18}, {**SECOND, "base": [-0.09, 0], "step": 0.005}
+DRAWN = {"length": {"uniform": [0.1, 0.12]}, "rest_curvature": {"normal": [0.0, 1.0]}}
 SI = changed(
     CARRIED,
     contours=[{"family": "parabola", "a": {"uniform": [5.0, 8.0]}, "q": {"uniform": [0.06, 0.07]}}],
-    rod={
-        "length": {"uniform": [0.1, 0.12]},
-        "flexural_rigidity": 1e-4,
-        "diameter": 1e-3,
-        "rest_curvature": {"normal": [0.0, 1.0]},
-        "taper": 0.3,
-    },
-    scan={
-        "samples": 30,
-        "translations": [{**FIRST, "base": [0.09, 0.0], "travel": 0.18}, {**SECOND, "base": [-0.09, 0], "step": 0.005}],
-    },
+    rod={**DRAWN, "flexural_rigidity": 1e-4, "diameter": 1e-3, "taper": 0.3},
+    scan={"samples": 30, "translations": [NEAR, OTHER]},
     unknown={**NOTHING, "friction": 0.2},
     load_cell={"frame": "turning", "drive_angle_offset": 0.01, "drive_angle_backlash": 0.004, "force_noise": 1e-5},
 )
@@ -47,15 +40,14 @@ TURNED = changed(
     CARRIED,
     scan__translations=[{**FIRST, "drive_angle": 0.9, "turn": {"uniform": [0.5, 0.7]}}, {**SECOND, "turn": 0.2}],
 )
-TURNED_SI = changed(SI, scan__translations=[{**FIRST, "base": [0.09, 0.0], "travel": 0.18, "turn": -0.1}])
+TURNED_SI = changed(SI, scan__translations=[{**NEAR, "turn": -0.1}])
 BRIEF = changed(CARRIED, scan__translations=[{**FIRST, "travel": 0.9}])
 
 
-@pytest.mark.parametrize(
-    "spec",
-    [CARRIED, SI, TURNED, TURNED_SI, BRIEF],
-    ids=["dimensionless", "SI", "turned", "turned, SI", "in contact at the end"],
-)
+SPECS = {"dimensionless": CARRIED, "SI": SI, "turned": TURNED, "turned, SI": TURNED_SI, "in contact at the end": BRIEF}
+
+
+@pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 def test_the_truth_is_what_a_scan_along_the_drive_says(spec, assert_truths_are_those_of_scans):
     assert_truths_are_those_of_scans(spec, 4)
 

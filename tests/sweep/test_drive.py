@@ -76,15 +76,10 @@ def test_a_scan_records_where_the_base_is(drive):
         np.stack([record[name].values for name in ("base_x", "base_y", "drive_angle")], axis=-1), drive.at(travels)
     )
     loaded = record.truth_contact_phase.values != "none"
-    np.testing.assert_array_equal(
-        loaded, (travels >= events.first_contact.travel) & (travels <= events.snap_off.travel)
-    )
-    np.testing.assert_allclose(
-        [events.snap_off.base_x, events.snap_off.base_y, events.snap_off.drive_angle],
-        drive.at(events.snap_off.travel),
-        atol=1e-12,
-    )
-    assert events.first_contact.holding_moment == 0.0
+    first, snap = events.first_contact, events.snap_off
+    np.testing.assert_array_equal(loaded, (travels >= first.travel) & (travels <= snap.travel))
+    np.testing.assert_allclose([snap.base_x, snap.base_y, snap.drive_angle], drive.at(snap.travel), atol=1e-12)
+    assert first.holding_moment == 0.0
     assert carried_sweeps(record) == (0,)
 
 

@@ -1,5 +1,7 @@
 """Scans and equilibria as a user asks for them: against shooting, bisection, a hundred-digit judge, and themselves."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -15,17 +17,11 @@ from tactile_bayes.record import CHANNELS
 EPS = np.finfo(float).eps
 
 
+SHOT = {"II": (0.5, (0.0, 0.0)), "III": (0.3, (0.15, -0.1)), "IV": (0.5, (-0.1, 0.05)), "I": (0.7, (0.05, 0.0))}
+
+
 @pytest.mark.parametrize("direction", ["forward", "backward"])
-@pytest.mark.parametrize(
-    ("contour", "base"),
-    [
-        (paper_profile("II", 0.5), (0.0, 0.0)),
-        (paper_profile("III", 0.3), (0.15, -0.1)),
-        (paper_profile("IV", 0.5), (-0.1, 0.05)),
-        (paper_profile("I", 0.7), (0.05, 0.0)),
-    ],
-    ids=["II", "III", "IV", "I"],
-)
+@pytest.mark.parametrize(("contour", "base"), [(paper_profile(n, q), b) for n, (q, b) in SHOT.items()], ids=SHOT)
 def test_equilibria_against_shooting(contour, base, direction):
     """Equations (19) and (20) integrated from the pivot, shot at the contact from a guess five per cent off."""
     side = 1 if direction == "forward" else -1
@@ -108,11 +104,14 @@ def test_a_thick_rod_is_a_thin_one_on_the_parallel_curve():
         np.testing.assert_array_equal(one.contact_phase, two.contact_phase)
         np.testing.assert_allclose([one.contact_x, one.contact_y], thick.point(slopes), rtol=1e-13)
     a, b = scan(thick, rig=Rig(rod=Rod(diameter=d))).events, scan(thin).events
-    for direction in ("forward", "backward"):
-        assert a[direction].snap_off.drive_angle == pytest.approx(b[direction].snap_off.drive_angle, abs=1e-12)
-        assert a[direction].first_contact.drive_angle == pytest.approx(
-            b[direction].first_contact.drive_angle, abs=1e-12
-        )
+    for direction, event in product(("forward", "backward"), ("first_contact", "snap_off")):
+        one, two = (getattr(of[direction], event).drive_angle for of in (a, b))
+        assert one == pytest.approx(two, abs=1e-12)
+
+
+def seen(event, side):
+    """Drive angle of an event as in a forward sweep."""
+    return event.drive_angle if side > 0 else np.pi - event.drive_angle
 
 
 def kinds(events):
@@ -137,9 +136,7 @@ def test_profile_two_lets_go_at_the_corner():
         assert kinds(sweep) == ["tip", "tip → tangential", "corner"]
         last = sweep.snap_off
         assert side * last.slope_angle == pytest.approx(corner, abs=1e-12)
-        assert (last.drive_angle if side > 0 else np.pi - last.drive_angle) == pytest.approx(
-            truth.drive_angle, abs=1e-10
-        )
+        assert seen(last, side) == pytest.approx(truth.drive_angle, abs=1e-10)
         assert side * last.holding_moment == pytest.approx(truth.moment, rel=1e-9)
         assert last.force_y == pytest.approx(truth.force * np.cos(corner), rel=1e-9)
         assert last.contact_arclength == pytest.approx(1.0, abs=1e-12)
@@ -178,16 +175,14 @@ def test_phase_changes_and_first_contact_by_bisection(name, q, base):
             assert np.hypot(x, y) <= 1
         assert slope == pytest.approx(truth, abs=1e-10)
         bearing = np.arctan2(y, x)
-        assert (first.drive_angle if side > 0 else np.pi - first.drive_angle) == pytest.approx(bearing, abs=1e-12)
+        assert seen(first, side) == pytest.approx(bearing, abs=1e-12)
         assert first.holding_moment == first.force_x == first.force_y == 0
         for change in sweep.transitions:
             at = side * change.slope_angle
             exact = brentq(lambda a: tangential_arclength(*relative(a)) - 1, at - 1e-5, at + 1e-5, xtol=1e-15)
             assert at == pytest.approx(exact, abs=1e-10)
             truth = equilibrium(*relative(at))
-            assert (change.drive_angle if side > 0 else np.pi - change.drive_angle) == pytest.approx(
-                truth.drive_angle, abs=1e-10
-            )
+            assert seen(change, side) == pytest.approx(truth.drive_angle, abs=1e-10)
 
 
 def test_profile_four_lets_go_at_its_vertex():

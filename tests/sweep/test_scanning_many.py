@@ -42,15 +42,11 @@ def test_each_is_what_its_own_scan_says(contours, direction, friction):
         near = np.abs(ANGLES - events.snap_off.drive_angle) < 1e-9
         assert bool(mine.clear) == events.clear
         for name in CHANNELS:
-            largest = np.abs(record[name].values).max()
-            np.testing.assert_allclose(
-                mine[name].values, record[name].values, rtol=0, atol=1e-7 * largest, err_msg=name
-            )
+            atol = 1e-7 * np.abs(record[name].values).max()
+            np.testing.assert_allclose(mine[name].values, record[name].values, rtol=0, atol=atol, err_msg=name)
         for name in TRUTH:
-            scale = LENGTH if name.startswith("contact") else 1.0
-            np.testing.assert_allclose(
-                mine[name].values[~near], record[f"truth_{name}"].values[~near], rtol=0, atol=2e-5 * scale, err_msg=name
-            )
+            atol, theirs = 2e-5 * (LENGTH if name.startswith("contact") else 1.0), record[f"truth_{name}"].values
+            np.testing.assert_allclose(mine[name].values[~near], theirs[~near], rtol=0, atol=atol, err_msg=name)
         assert (mine.contact_phase == record.truth_contact_phase).mean() > 0.99
         for event in ("first_contact", "snap_off"):
             for name in ("drive_angle", "slope_angle", "contact_x", "contact_y"):
