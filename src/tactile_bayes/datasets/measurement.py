@@ -17,10 +17,10 @@ from tactile_bayes.load_cell.blocks import elapsed
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.record import CHANNELS, turned
 
-_NOISES, _OF_ENCODER = ("force_noise", "moment_noise", "relative_noise"), ("offset", "backlash", "noise")
+_OF_ENCODER = ("drive_angle_offset", "drive_angle_backlash", "drive_angle_noise")
 # Entries of a data sheet whose validity does not depend on the others: field, and position in it.
 _HARMLESS: dict[str, tuple[str, int | None]] = {
-    **{name: (name, None) for name in (*_NOISES, *(f"drive_angle_{of}" for of in _OF_ENCODER))},
+    **{name: (name, None) for name in ("force_noise", "moment_noise", "relative_noise", *_OF_ENCODER)},
     **{f"lever_{axis}": ("lever", k) for k, axis in enumerate("xy")},
     **{f"{stem}_{name}": (stem, k) for stem in ("bias", "bias_uncertainty") for k, name in enumerate(CHANNELS)},
 }

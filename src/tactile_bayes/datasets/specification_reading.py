@@ -263,7 +263,7 @@ def _rod(rod: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
         if name != "rest_curvature":
             most = STEEPEST_TAPER if name == "taper" else math.inf
             may_vanish = name in ("taper", "diameter", "stem", "rest_curvature_deviation")
-            _refuse_outside(f"rod.{name}", of, 0.0, most, may_vanish)
+            _refuse_outside(f"rod.{name}", of, most, may_vanish)
     try:
         numbers = _at_share(distributions, 0.5)
         if "youngs_modulus" in numbers:
@@ -287,7 +287,7 @@ def _load_cell(table: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
             raise SpecificationError(f"load_cell: {error}") from error
     for name, of in distributions.items():
         if not name.startswith(_SIGNED):
-            _refuse_outside(f"load_cell.{name}", of, 0.0)
+            _refuse_outside(f"load_cell.{name}", of)
     return distributions
 
 
@@ -297,13 +297,13 @@ def _at_share(distributions: Mapping[str, Variation], share: float) -> dict[str,
     return {name: float(distribution.at(np.full(1, share), turn)[0]) for name, distribution in distributions.items()}
 
 
-def _refuse_outside(key: str, of: Variation, least: float, most: float = math.inf, may_be_least: bool = True) -> None:
-    """Refuse a distribution with numbers out of range."""
+def _refuse_outside(key: str, of: Variation, most: float = math.inf, may_vanish: bool = True) -> None:
+    """Refuse a distribution with numbers that are negative, above a limit, or zero where they may not vanish."""
     for end in of.ends:
-        if not least <= end <= most or (end == least and not may_be_least):
-            what = "negative" if least == 0.0 > end else "unbounded" if math.isinf(end) else f"{end:g}"
-            limits = f"{'from' if may_be_least else 'above'} {least:g} to {most:g}"
-            raise SpecificationError(f"{key} {_may_be(of)} {what}: give numbers {limits}, as by uniform or log_normal")
+        if not 0.0 <= end <= most or (end == 0.0 and not may_vanish):
+            what = "negative" if end < 0.0 else "unbounded" if math.isinf(end) else f"{end:g}"
+            wanted = "positive numbers" if math.isinf(most) else f"numbers from 0 to {most:g}"
+            raise SpecificationError(f"{key} {_may_be(of)} {what}: give {wanted}, as by uniform or log_normal")
 
 
 def _may_be(of: Variation) -> str:
@@ -361,7 +361,7 @@ def _translation(said: Mapping[str, Any], key: str) -> dict[str, Variation]:
             if math.isfinite(angle) and abs(angle) > 2.0 * math.pi:
                 raise SpecificationError(f"{key}.{name} may be {angle:g}: give angles in radians, at most a turn (2π)")
     for name in {"travel", "step"} & set(found):
-        _refuse_outside(f"{key}.{name}", found[name], 0.0, may_be_least=False)
+        _refuse_outside(f"{key}.{name}", found[name], may_vanish=False)
     return found
 
 
