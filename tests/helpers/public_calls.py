@@ -39,7 +39,7 @@ SPECIFICATION = {
 # Functions that begin what takes seconds, when all arguments have been checked.
 _SLOW = (
     *(
-        "inference.contour.sampled",
+        "inference.contour.spawn",
         "inference.point_load.sample",
         "inference.contact_posterior.posterior.draw_contacts",
     ),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -20,10 +19,11 @@ from tactile_bayes.diagnostics.predictive_check import Residuals, predictive_che
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.diagnostics.zeros import NOISE_FACTOR, OFF_ZERO, moved_zero, zero_off
-from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.misfit import GAUGE, is_inferred, what_to_try
 from tactile_bayes.inference.result import is_streamed, known_of, posterior_draws, record_of, refuse_no_contour
-from tactile_bayes.load_cell import LoadCell, zero_load
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides, drive_histories
 from tactile_bayes.record import CHANNELS, carried_sweeps
 from tactile_bayes.record.origin import column_entry
@@ -203,9 +203,7 @@ def check(
     except InferenceError as error:  # there are too few draws
         predictive, not_checked = None, str(error)
     residuals = residuals_of(posterior)  # after the check has released its own: those of a long record are large
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DriftWarning)  # a finding reports it
-        unloaded = zero_load(result.record)
+    unloaded = quiet_zero_load(result.record)
     against = [*unit_and_sign_findings(result.record), *doubtful_sides(attrs)]
     against += [*_off_zero(result.record, unloaded, residuals), *_moved_zero(result, unloaded)]
     if predictive is not None and not predictive.attrs["passed"] and not not_checked:

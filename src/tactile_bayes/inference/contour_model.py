@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
@@ -14,7 +13,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, log_density_of, support_of
-from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
+from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import Ends
@@ -22,8 +21,8 @@ from tactile_bayes.inference.parameters.noise import Noise
 from tactile_bayes.inference.parameters.unknowns import Unknowns
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.discrepancy import Discrepancy
+from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import CHANNELS
@@ -78,9 +77,7 @@ class ContourModel:
                 "drive_angle_noise or drive_angle_resolution together with a discrepancy have no closed form: leave "
                 "one of the two out (relative_noise of the load cell can stand for small errors of the encoder)"
             )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DriftWarning)
-            self.found = zero_load(measured)
+        self.found = quiet_zero_load(measured)
         self.zero, noise_found = self._unloaded()
         is_white = (noise_found > 0.0) & (not unknowns.memory)  # else readings that decay count as unloaded
         rough = np.where(is_white, noise_found, self._rough_noise())

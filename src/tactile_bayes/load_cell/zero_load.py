@@ -183,6 +183,13 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     return _labelled(record, sweeps, bounds, unloaded, statistics, channels).assign_attrs(false_alarm=false_alarm)
 
 
+def quiet_zero_load(record: xr.Dataset) -> xr.Dataset:
+    """Return `zero_load` for those who report a drift in another way, or do not mind it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DriftWarning)
+        return zero_load(record)
+
+
 def found_cell(record: xr.Dataset, *, false_alarm: float = 1e-3) -> dict[str, Any]:
     """Arguments of the `LoadCell` of `LoadCell.from_zero_load`; see there."""
     found = zero_load(record, false_alarm=false_alarm)

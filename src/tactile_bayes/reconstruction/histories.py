@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.errors import DriftWarning
-from tactile_bayes.load_cell import LoadCell, zero_load
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import carried_sweeps
@@ -69,7 +67,5 @@ def _goes_on(measured: xr.Dataset, before: Index, own: Index, backward: Flags, g
 
 def _begins_in_contact(sweep: xr.Dataset) -> bool:
     """Return whether a sweep is loaded from its first sample."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DriftWarning)
-        found = zero_load(sweep)
+    found = quiet_zero_load(sweep)
     return not found["unloaded"].values[0]

@@ -22,7 +22,7 @@ _COMPARISONS = {
     "<": operator.lt,
     ">": operator.gt,
 }
-_CONDITION = re.compile(rf"\s*(?P<name>.*?\S)\s*(?P<sign>{'|'.join(_COMPARISONS)})\s*(?P<value>.*\S)\s*")
+_SIGN = re.compile("|".join(_COMPARISONS))
 
 
 def rows_where(table: Table, where: str) -> Table:
@@ -41,21 +41,22 @@ def rows_where(table: Table, where: str) -> Table:
 
 
 def _meets(table: Table, condition: str) -> Flags:
-    match, names = _CONDITION.fullmatch(condition), list(table.columns)
-    if match is None:
+    names, sign = list(table.columns), _SIGN.search(condition)
+    wanted, value = (condition[: sign.start()].strip(), condition[sign.end() :].strip()) if sign else ("", "")
+    if not (sign and wanted and value):
         example = f"{names[0]} > 0" if names else "trial == 3"
         raise table.source.error(
             f"where = {condition.strip()!r} in [file] is no condition: write a column, one of "
             f"{', '.join(_COMPARISONS)}, and a value, as in {example!r}; several are joined by 'and'"
         )
-    name, text = found_column(match["name"], names), match["value"].strip("'\"")
+    name, text = found_column(wanted, names), value.strip("'\"")
     if name is None:
-        near = nearest(match["name"], names)
+        near = nearest(wanted, names)
         raise table.source.error(
-            f"where = {condition.strip()!r} in [file]: there is no column {match['name']!r}: "
+            f"where = {condition.strip()!r} in [file]: there is no column {wanted!r}: "
             + (f"did you mean {near!r}?" if near else f"the columns are {', '.join(names)}")
         )
-    values, compared = table.columns[name][0], _COMPARISONS[match["sign"]]
+    values, compared = table.columns[name][0], _COMPARISONS[sign[0]]
     try:
         number = float(text)
     except ValueError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +11,10 @@ import xarray as xr
 
 from tactile_bayes.assessment.trust import draws_digest
 from tactile_bayes.diagnostics.result_check import Check, budget_if_any, check, probability_of
-from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.inference.stored_experiment import contact_points
-from tactile_bayes.load_cell import zero_load
+from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.record import record_hash
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.report.contour_figure import ContourFindings
@@ -77,9 +76,7 @@ def findings_of(
     checked = check(posterior, contacts, trust)
     progress(3)
     edges = gap_if_any(posterior, probability)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DriftWarning)  # as the check does
-        zero = zero_load(record)
+    zero = quiet_zero_load(record)
     x = reach(posterior)
     found = Findings(
         posterior=posterior,

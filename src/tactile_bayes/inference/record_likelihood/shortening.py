@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Container
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -11,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.errors import DriftWarning
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
-from tactile_bayes.load_cell import LoadCell, RandomWalk, zero_load
+from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.load_cell.blocks import AFTER_CONTACT, BEFORE_ONSET, IN_CONTACT
+from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.reconstruction import least_turn, turned_sweeps, with_sides
 from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels, rows_of_sweeps
@@ -136,9 +135,7 @@ class _Readings:
         self.values = np.stack([record[name].values for name in CHANNELS], axis=-1)
         self.angle = record["drive_angle"].values.astype(float)
         self.groups = self._groups(RecordSegments(record, cell))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DriftWarning)
-            self.found = zero_load(record)
+        self.found = quiet_zero_load(record)
 
     def _groups(self, segments: RecordSegments) -> list[_Group]:
         sweep, groups = self.record["sweep"].values, []
