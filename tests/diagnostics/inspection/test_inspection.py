@@ -281,6 +281,13 @@ def test_a_record_or_a_sweep_without_contact(record):
     assert (sentence.kind, sentence.details["sweeps"]) == ("sweep without contact", "Sweep 1 shows")
 
 
+def test_touches_do_not_count_as_sweeps_without_contact(record):
+    moment = record.holding_moment.values
+    touches = record.isel(sample=moment > 0.3 * moment.max())
+    touches = changed(touches, sweep=np.arange(touches.sizes["sample"]))
+    assert not {"no contact", "sweep without contact"} & {found.kind for found in words(touches)}
+
+
 def test_a_zero_that_moves_and_one_that_is_not_as_stated(ideal, record):
     later = record.sweep.values == 1
     moved = words(changed(record, force_y=record.force_y + 0.01 * later))

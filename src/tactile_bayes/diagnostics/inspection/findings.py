@@ -25,7 +25,7 @@ from tactile_bayes.rig.parameters import PARAMETERS
 UNFIT = 0.25
 _FAR = 3.0  # standard deviations of a bias's prior beyond which `check` would report the bias
 _CORRELATED = 0.2  # autocorrelation of neighbours below which noise counts as white
-_FEWEST_IN_CONTACT = 10
+_FEWEST_IN_CONTACT = 10  # samples in contact that are no few, and those of a sweep that may show that it has none
 _UNITS = {"large loads", "small loads", "long lever"}
 
 
@@ -57,7 +57,7 @@ def inspection_findings(
 
 def _untouched(record: xr.Dataset, sweeps: xr.Dataset) -> list[Finding]:
     """Report that there is no contact, or else the channels that never change."""
-    if not sweeps.contact.values.any():
+    if not np.any(sweeps.contact.values | _is_short(sweeps)):
         return [Finding("no contact")]
     names = [name for name in present_channels(record) if np.ptp(record[name].values) == 0.0]
     return [Finding("dead channel", channel=name, entry=rig_entry("missing", [name])) for name in names]
@@ -100,9 +100,14 @@ def _cut_off(record: xr.Dataset, samples: xr.Dataset, stated: LoadCell | None) -
 
 
 def _without_contact(sweeps: xr.Dataset) -> list[Finding]:
-    none = sweeps.sweep.values[~sweeps.contact.values].tolist()
+    none = sweeps.sweep.values[~(sweeps.contact.values | _is_short(sweeps))].tolist()
     some = 0 < len(none) < sweeps.sizes["sweep"]
     return [Finding("sweep without contact", sweeps=of_sweeps(none, "show"))] if some else []
+
+
+def _is_short(sweeps: xr.Dataset) -> Flags:
+    """Return True for sweeps of a few readings, like touches, whose ends may be loaded as well."""
+    return np.asarray(sweeps.samples.values < _FEWEST_IN_CONTACT)
 
 
 def _stored_twice(samples: xr.Dataset) -> list[Finding]:
