@@ -46,9 +46,7 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
     """
     source = table.source
     table.refuse_empty()
-    for name in ("sweep", "direction"):
-        if name in table.columns:
-            raise source.column_error(name, "is there already: do without split_sweeps, or remove the column")
+    _refuse_present(table, "sweep", "direction")
     sweeps = [(0, table.samples, True)]
     if "drive_angle" in table.columns:  # else refused later, with the others that are missing
         angle = _finite("drive_angle", table)
@@ -76,10 +74,16 @@ def _sweeps_in(angle: Floats, base: Floats, length: float, source: Source) -> li
 
 def each_row(table: Table) -> Table:
     """Add sweeps to a table of touches, each row one of them."""
-    if "sweep" in table.columns:
-        what = "is there already: do without split_sweeps, or remove the column"
-        raise table.source.column_error("sweep", what)
+    _refuse_present(table, "sweep")
     return replace(table, columns={**table.columns, "sweep": (np.arange(table.samples), {})})
+
+
+def _refuse_present(table: Table, *names: str) -> None:
+    """Refuse columns that are to be derived."""
+    for name in names:
+        if name in table.columns:
+            what = "is there already: do without split_sweeps, or remove the column"
+            raise table.source.column_error(name, what)
 
 
 def _finite(name: str, table: Table) -> Floats:
