@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.misspecification import Misspecification
@@ -17,13 +18,12 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import loads_of
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 
 QUIET = LoadCell(force_noise=1e-12, moment_noise=1e-12)
-NOISY = LoadCell(force_noise=0.05, moment_noise=0.02)
 ANGLES = np.radians(np.arange(-30.0, 211.0, 5.0))
 DRIVE = tb.Rotation(drive_angles=ANGLES)
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
@@ -47,10 +47,6 @@ def among(*names):
 def real(load_cell=None, **known):
     """A rig that is as stated, but for this."""
     return Rig(load_cell=load_cell, unknown={**NOTHING, **known})
-
-
-def loads_of(record):
-    return np.stack([record[name].values for name in CHANNELS], axis=-1)
 
 
 def same_loads(made, scan):
@@ -220,14 +216,14 @@ def noise_of(made):
 
 def test_noise_is_what_the_load_cell_that_measures_makes():
     """Of the same random numbers twice the noise is twice the noise; the scale that is inferred is on top of both."""
-    told = noise_of(simulated(load_cell=NOISY))
+    told = noise_of(simulated(load_cell=CELL))
     other = LoadCell(force_noise=0.1, moment_noise=0.04)
-    made = simulated(load_cell=NOISY, truth=Rig(load_cell=other, unknown="nothing"))
+    made = simulated(load_cell=CELL, truth=Rig(load_cell=other, unknown="nothing"))
     np.testing.assert_allclose(noise_of(made), 2.0 * told, atol=1e-8)
-    assert made.truth["noise_scale"] == pytest.approx(2.0 * simulated(load_cell=NOISY).truth["noise_scale"])
-    fixed = simulated(load_cell=NOISY, truth=real(noise_scale=3.0))
+    assert made.truth["noise_scale"] == pytest.approx(2.0 * simulated(load_cell=CELL).truth["noise_scale"])
+    fixed = simulated(load_cell=CELL, truth=real(noise_scale=3.0))
     assert fixed.truth["noise_scale"] == pytest.approx(3.0)
-    unlike = simulated(load_cell=NOISY, truth=real(replace(NOISY, force_noise=0.1)))
+    unlike = simulated(load_cell=CELL, truth=real(replace(CELL, force_noise=0.1)))
     assert "noise_scale" not in unlike.truth  # channels differ in it
     deviations = noise_of(fixed) / (3.0 * np.array([0.02, 0.05, 0.05]))
     assert abs(np.mean(deviations**2) - 1.0) < 5.0 * np.sqrt(2.0 / deviations.size)  # false alarm 1e-6
@@ -266,7 +262,7 @@ def test_truths_come_from_the_other_family_and_inference_takes_its_own():
 
 
 def test_the_same_numbers_again():
-    one, other, third = (simulated(seed, load_cell=NOISY) for seed in (3, 3, 4))
+    one, other, third = (simulated(seed, load_cell=CELL) for seed in (3, 3, 4))
     np.testing.assert_array_equal(loads_of(one.measured), loads_of(other.measured))
     assert one.truth == other.truth != third.truth
 

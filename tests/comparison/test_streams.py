@@ -8,11 +8,11 @@ import xarray as xr
 from scipy.special import softmax
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.parameters.priors import matched_priors
 
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 RIG = tb.Rig(load_cell=CELL, unknown="nothing")
 OPTIONS = {"rig": RIG, "rng": 1, "particles": 200}
 FAMILIES = ["circle", "ellipse", "parabola"]

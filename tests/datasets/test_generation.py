@@ -17,7 +17,7 @@ from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification import left_out
 from tactile_bayes.errors import SpecificationError, StrainWarning
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import loads_of
 from tactile_bayes.rig import NOTHING, Rig
 
 FALSE_ALARM = 1e-4  # of each statistical test here
@@ -141,8 +141,8 @@ def test_readings_are_those_of_the_load_cell_that_the_record_states(frame, name)
         stated = tb.LoadCell.from_record(one) or tb.LoadCell()
         assert set(stated.entries()) <= set(cell)
         rng = np.random.default_rng(np.random.SeedSequence(spec["seed"], spawn_key=(i, 1)))
-        truth = np.stack([one[f"truth_{name}"].values for name in CHANNELS], axis=-1)
-        readings = np.stack([one[name].values for name in CHANNELS], axis=-1)
+        truth = loads_of(one, "truth_")
+        readings = loads_of(one)
         np.testing.assert_array_equal(readings, stated.simulate(truth, rng=rng))
         if "drive_angle_noise" in cell:
             wrong = one.drive_angle.values - one.truth_drive_angle.values - stated.misread(one.direction.values)

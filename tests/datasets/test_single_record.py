@@ -11,6 +11,7 @@ from tactile_bayes.checks import shown
 from tactile_bayes.datasets import contour_of, generate, read_specification, record
 from tactile_bayes.datasets.specification import toml_of
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.record import loads_of
 
 
 @pytest.fixture(scope="module", params=[PLAIN, RICH, SHAPES], ids=["plain", "rich", "shape-free"])
@@ -57,7 +58,7 @@ def test_readings_at_the_end_of_the_range_are_there_also_from_32_bits(limit, tmp
             at_limit = np.abs(exact[name].values) == limit
             assert np.any(at_limit)
             np.testing.assert_array_equal(one[name].values[at_limit], exact[name].values[at_limit])
-        readings = np.stack([one[name].values for name in ("holding_moment", "force_x", "force_y")], axis=-1)
+        readings = loads_of(one)
         assert np.abs(readings).max() == limit
         assert np.count_nonzero(cell.cuts_off(readings)) == np.count_nonzero(np.abs(readings) == limit)
 

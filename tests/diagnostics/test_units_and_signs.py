@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
+from helpers.load_cells import CELL
 from tactile_bayes.contours import Circle, paper_profile
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, in_frame
 from tactile_bayes.runs.demonstration import LOAD_CELL
 from tactile_bayes.sweep import scan
 
 STEP = 0.05
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.rig import Rig
 
@@ -13,7 +14,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::tactile_bayes.errors.StrainWarning"),
 ]
 
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 EXACT_CELL = tb.LoadCell(force_noise=1e-7, moment_noise=1e-7)
 
 

@@ -21,7 +21,7 @@ from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import samples_of
-from tactile_bayes.record import CHANNELS, frame_of, in_frame, rod_of
+from tactile_bayes.record import frame_of, in_frame, loads_of, rod_of
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
@@ -241,7 +241,7 @@ def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", frict
     """The package's own density of some samples."""
     samples, rod = samples_of(record, cell), rod_of(record)
     units = rod.load_units
-    readings = LoneSamples(cell.dimensionless(rod), np.stack([record[name].values for name in CHANNELS], -1) / units)
+    readings = LoneSamples(cell.dimensionless(rod), loads_of(record) / units)
     base = np.stack([record.base_x.values, record.base_y.values], axis=-1)
     options = {"turning": frame_of(record) == "turning", "friction": friction, "prior": prior}
     return ContactDensity(samples, readings, base, **options).take(np.atleast_1d(which))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from helpers.load_cells import CELL
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
@@ -14,7 +15,6 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import scan
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 DEVIATIONS = np.array([0.02, 0.05, 0.05])
 STEP = float(np.radians(2.0))
 TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import loads_of
 
 
 def assert_expected(record, rig, truth, tolerance):
@@ -19,6 +19,6 @@ def assert_expected(record, rig, truth, tolerance):
     own = model.likelihood.load_cell
     sensed = model.unknowns.sensed(loads, model.values(point), own)
     expected = own.expected(sensed)[0] * model.likelihood.rod.load_units
-    readings = np.stack([record[channel].values for channel in CHANNELS], axis=1)
+    readings = loads_of(record)
     largest = np.abs(expected).max(axis=0)
     np.testing.assert_allclose(readings / largest, expected / largest, rtol=0, atol=tolerance)

@@ -66,16 +66,3 @@ def shoot(
     solution = root(miss, guess, tol=1e-13)
     assert np.max(np.abs(solution.fun)) < 1e-11, solution.message
     return solution.x
-
-
-def bent_rod(psi1: float, arclength: float, force: float, curvature: float) -> NDArray[np.float64]:
-    """Vector from pivot to contact across and against the force, and turn, of an arc integrated from its contact."""
-
-    def slope(_s: float, z: NDArray[np.float64]) -> list[float]:
-        return [np.cos(z[2]), np.sin(z[2]), -z[3], -force * np.cos(z[2])]
-
-    start = [0.0, 0.0, psi1, curvature]
-    solution = solve_ivp(slope, (0.0, arclength), start, method="DOP853", rtol=RTOL, atol=ATOL)
-    assert solution.success, solution.message
-    u, v, psi0, _ = solution.y[:, -1]
-    return np.array([u, v, psi0 - psi1])

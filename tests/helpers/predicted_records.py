@@ -5,15 +5,15 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
+from helpers.load_cells import CELL
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Scan, scan
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 STEP = float(np.radians(3.0))
 
 # Enough for predictions of a record, and far from converged.
@@ -30,7 +30,7 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250) -> xr
     """A tree as `infer_contour` returns it, of a posterior that is a point, and of a record from it."""
     rng = np.random.default_rng(1)
     ideal = swept().record
-    loads = np.stack([ideal[name].values for name in CHANNELS], axis=-1)
+    loads = loads_of(ideal)
     values = cell.simulate(np.broadcast_to(loads, (chains, draws, *loads.shape)), rng=rng)
     dims = ("chain", "draw", "sample")
     predictive = {name: (dims, values[..., i], ideal[name].attrs) for i, name in enumerate(CHANNELS)}

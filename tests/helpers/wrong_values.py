@@ -12,8 +12,7 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers import public_calls as calls
-
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+from helpers.load_cells import CELL
 
 # Values that few arguments take.
 WRONG: list[Any] = [

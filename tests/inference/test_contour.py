@@ -36,7 +36,7 @@ from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihoo
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics import blocks
-from tactile_bayes.record import CHANNELS, in_frame, record_hash, to_si
+from tactile_bayes.record import CHANNELS, in_frame, loads_of, record_hash, to_si
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Translation, scan, scan_many
 
@@ -57,7 +57,7 @@ def test_moments_are_those_of_a_grid():
     whitened = whitened[(whitened**2).sum(axis=1) < 25.0]
     points = draws.mean(axis=0) + whitened @ root.T
     loads = np.concatenate([likelihood.predict(Parabola(*part.T))[0] for part in np.array_split(points, 20)])
-    values = np.stack([record[name] for name in CHANNELS], axis=-1)
+    values = loads_of(record)
     squares = (((values - loads) / DEVIATIONS) ** 2).sum(axis=(1, 2))
     priors = Experiment(record, Rig(load_cell=CELL)).priors
     log_prior = sum(priors[name].logpdf(points[:, i]) for i, name in enumerate(TRUTH))

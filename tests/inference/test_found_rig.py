@@ -12,7 +12,7 @@ import tactile_bayes as tb
 from helpers.contour_posteriors import CELL
 from tactile_bayes.inference.stored_experiment import contact_points, found_rig
 from tactile_bayes.reconstruction import contacts_of
-from tactile_bayes.record import CHANNELS, to_dimensionless, with_rod
+from tactile_bayes.record import CHANNELS, loads_of, to_dimensionless, with_rod
 from tactile_bayes.rig import Rig
 
 CONTOUR = tb.contours.Parabola(0.5, q=0.5)
@@ -56,7 +56,7 @@ def swept(friction):
 def read_with(faults, *, stated=None, frame="fixed"):
     """What the rig reads, without noise, and where the rod really touches."""
     truth = swept(faults.get("friction", 0.0))
-    loads = np.stack([truth[name].values for name in CHANNELS], axis=1) * faults.get("rigidity_scale", 1.0)
+    loads = loads_of(truth) * faults.get("rigidity_scale", 1.0)
     slope = truth.drive_angle.values + faults.get("suspension_compliance", 0.0) * loads[:, 0]
     short = ("moment", "force_x", "force_y")
     if frame == "turning":

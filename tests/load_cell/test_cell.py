@@ -12,7 +12,7 @@ from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, frame_of, in_frame, present_channels, to_si
+from tactile_bayes.record import CHANNELS, frame_of, in_frame, loads_of, present_channels, to_si
 from tactile_bayes.rig import Rig
 
 # --- Measuring --------------------------------------------------------------------------------------------------
@@ -81,8 +81,8 @@ def test_an_ideal_cell_measures_what_was_measured_and_takes_nothing_out():
 def test_a_record_is_measured_as_arrays_are(name):
     record = ideal(30)
     measured = NORMAL[name].measure(record, rng=5)
-    loads = np.stack([record[c].values for c in CHANNELS], axis=-1)
-    made = np.stack([measured[c].values for c in CHANNELS], axis=-1)
+    loads = loads_of(record)
+    made = loads_of(measured)
     np.testing.assert_array_equal(made, NORMAL[name].simulate(loads, rng=5))
 
 
@@ -203,7 +203,7 @@ def test_taking_out_leaves_noise_and_what_is_unknown():
     back = sheet.corrected(measured)
     assert measured.identical(before)
     assert LoadCell.from_record(back) == cell(bias_uncertainty=UNKNOWN)
-    readings, loads = (np.stack([r[c].values for c in CHANNELS], axis=-1) for r in (measured, back))
+    readings, loads = (loads_of(r) for r in (measured, back))
     loads[:, 0] += 0.2 * loads[:, 1] - 0.1 * loads[:, 2]
     np.testing.assert_allclose(loads @ np.array(GAIN).T + [0.1, -0.2, 0.3], readings, rtol=0, atol=1e-14)
     np.testing.assert_allclose(back.drive_angle, ideal(20).drive_angle, rtol=1e-15)

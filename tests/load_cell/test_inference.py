@@ -14,7 +14,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, loads_of
 
 FLAWED = replace(CELL, bias=(0.05, 0.1, -0.1), gain=GAIN, drive_angle_offset=0.01)
 UNKNOWN_BIAS = replace(
@@ -112,7 +112,7 @@ def test_a_drift_goes_on_through_all_sweeps():
     likelihood = RecordLikelihood(record, cell(drift=WALK))
     contour = Parabola(*(np.array([value]) for value in TRUTH.values()))
     predicted, _ = likelihood.predict(contour)
-    readings = np.stack([record[name].values for name in CHANNELS], axis=-1)
+    readings = loads_of(record)
     expected = cell(drift=WALK).log_likelihood(readings, predicted)
     np.testing.assert_allclose(likelihood.log_likelihood(contour), expected, rtol=1e-13)
     flat = CELL.log_likelihood(readings, predicted)

@@ -8,6 +8,7 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError, StudyError
@@ -28,7 +29,6 @@ from tactile_bayes.tasks import Workers
 
 FAMILY = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0.0, 0.05))
 AS_STATED = Rig(unknown="nothing")
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 QUICK = SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.05, min_ess=200.0, max_steps=400)
 STEP = float(np.radians(4.0))
 TRANSLATION = Translation((0.8, 0.0), np.pi, 1.2, 1.5)

@@ -9,18 +9,19 @@ import pytest
 from scipy import integrate, stats
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import loads_of
 from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import expanded
 
 PROFILE = paper_profile("II", q=0.5)
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 told = cache(information)
 DOUBLE = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=np.radians(2.0)))
 
@@ -54,7 +55,7 @@ def located(plan):
 def swept(a, q, x_c, less, direction):
     """Loads by `scan` at angles that are less than those of BETWEEN, shape (samples, 3)."""
     record = tb.scan(Parabola(a, q, x_c), drive_angles=BETWEEN - less, direction=direction).record
-    return np.stack([record[name].values for name in CHANNELS], axis=-1), record.drive_angle.values
+    return loads_of(record), record.drive_angle.values
 
 
 def readings(plan, values, by_angle=0.0):
@@ -128,6 +129,16 @@ def test_information_of_an_encoder_is_that_of_dense_algebra(name, frame):
     assert_matrices_agree(record_information(plan.model, plan.point).matrix[:size, :size], right, 1e-6)
 
 
+def test_gains_of_a_point_multiply_the_slopes_by_the_drive_angle():
+    plan = between("gain", cell=replace(CELL, drive_angle_noise=0.004))
+    gains = np.array([1.1, 0.9, 1.3])
+    stated, other = plan.point.copy(), plan.point.copy()
+    columns = [plan.model.names.index(name) for name in GROUPS["gain"]]
+    stated[columns], other[columns] = 1.0, gains
+    one, many = (reading_slopes(plan.model, point).by_angle for point in (stated, other))
+    np.testing.assert_allclose(many, gains * one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
+
+
 def test_information_beside_a_discrepancy_is_that_of_dense_algebra():
     plan = between("rigidity_scale", "drive_angle_offset", "bias", "discrepancy")
     slopes, _ = scan_slopes(plan)
@@ -174,7 +185,7 @@ def test_what_cannot_be_negative_is_looked_at_from_inside():
 
     def read(friction):
         record = tb.scan(PROFILE, drive_angles=BETWEEN, rig=Rig(unknown={"friction": friction})).record
-        return np.stack([record[name].values for name in CHANNELS], axis=-1)
+        return loads_of(record)
 
     right = (4.0 * read(1e-4) - read(2e-4) - 3.0 * read(0.0)) / 2e-4
     np.testing.assert_allclose(found[..., 3], right, rtol=0.0, atol=1e-3 * np.abs(right).max())

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, paper_profile
 from tactile_bayes.contours.families import family_named
@@ -16,11 +17,10 @@ from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import loads_of
 from tactile_bayes.rig import NOTHING, Rig
 
 PROFILE = paper_profile("II", q=0.5)
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 X = np.linspace(-0.19, 0.19, 9)
 
 CONTOURS = {
@@ -56,7 +56,7 @@ def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
     cell = replace(CELL, bias=bias, gain=gain, lever=(0.01, 0.02), bias_uncertainty=(1.0, 1.0, 1.0), **encoder)
     plan = Plan(PROFILE, Rig(load_cell=cell), drive=tb.Rotation(drive_step=0.05))
     scanned = tb.scan(PROFILE, drive_step=0.05).record
-    loads, read = (np.stack([r[name].values for name in CHANNELS]) for r in (scanned, plan.record))
+    loads, read = (loads_of(r).T for r in (scanned, plan.record))
     loads[0] += 0.02 * loads[1] - 0.01 * loads[2]
     np.testing.assert_allclose(read, np.array(gain) @ loads + np.array(bias)[:, None], rtol=0.0, atol=1e-12)
     misread = np.where(scanned.direction.values == "forward", 0.06, 0.04)
@@ -72,7 +72,7 @@ def test_the_model_shows_the_record_at_the_point():
         values = dict(zip(plan.model.names, plan.point, strict=True))
         assert (values["a"], values["q"], values["x_c"], values["noise_scale"]) == (0.5, 0.5, 0.0, 1.0)
         loads = plan.model.loads(plan.point[None])[0]
-        right = np.stack([plan.record[name].values for name in CHANNELS], axis=-1)
+        right = loads_of(plan.record)
         np.testing.assert_allclose(loads, right, rtol=0.0, atol=1e-6)
 
 

@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
@@ -18,7 +19,6 @@ from tactile_bayes.planning.requirement import required_noise, required_rod
 from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 PLAN = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=np.radians(9.0)))
 
 CELLS = {

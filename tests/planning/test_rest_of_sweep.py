@@ -5,10 +5,10 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.rig import NOTHING, Rig
 
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 X = np.linspace(-0.2, 0.2, 5)
 SO_FAR = 40
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from helpers.load_cells import CELL
 from tactile_bayes import LoadCell, Rig, Rod, reconstruct, scan
 from tactile_bayes.contours import Parabola
 
 CONTOUR = Parabola(0.5, 0.5)
 TAPERED = Rod(diameter=0.02, taper=0.5)
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 
 
 def swept(rod, step=4.0, friction=0.0):

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+from helpers.load_cells import CELL
 from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, reconstruct, scan
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
@@ -15,8 +16,6 @@ from tactile_bayes.diagnostics.result_check import doubtful_sides
 from tactile_bayes.reconstruction import contact_sides, sides_and_doubts
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.runs.reconstruction import reconstruction_messages
-
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 
 
 @pytest.mark.parametrize(("family", "count"), [("parabola", 20), pytest.param("ellipse", 250, marks=pytest.mark.slow)])

@@ -8,19 +8,18 @@ import pytest
 import xarray as xr
 from scipy.stats import kstest
 
-from helpers.load_cells import GAIN, SHARED
+from helpers.load_cells import CELL, GAIN, SHARED
 from helpers.refusals import refused
 from tactile_bayes import LoadCell, Rig, Rod, make_record, reconstruct, scan
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
-from tactile_bayes.record import CHANNELS, in_frame
+from tactile_bayes.record import CHANNELS, in_frame, loads_of
 
 METHODS = pytest.mark.parametrize("method", ["raw", "constrained"])
 PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
 SPREADS = (*(f"{name}_sd" for name in PLACE), "tangent_sd", "normal_sd")
 NUMBERS = (*PLACE, *SPREADS, "contact_xy_correlation")
-FAMILIAR = LoadCell(force_noise=0.05, moment_noise=0.02)
 WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=4e-3)
 SOFT = Rod(length=0.2, flexural_rigidity=0.8 * 2.4e-3, diameter=4e-3)
 
@@ -154,7 +153,7 @@ def test_errors_that_samples_share_are_in_each(swept, method, kind):
     load_cell = SHARING[kind]
     for phase in ("tip", "tangential"):
         one = swept.isel(sample=np.full(late + 1, pick(swept, phase)))
-        loads = np.stack([one[name].values for name in CHANNELS], axis=-1)
+        loads = loads_of(one)
         readings = load_cell.simulate(np.broadcast_to(loads, (records, late + 1, 3)), rng=1)[:, -1]
         angles = one.drive_angle.values[0] + load_cell.drive_angle_noise * np.random.default_rng(2).normal(size=records)
         stated = reconstruct(one, method=method, rig=Rig(load_cell=load_cell)).isel(sample=-1)
@@ -202,19 +201,19 @@ def test_the_misfit_is_chi_square_clear_of_the_edge(scenes, sensor):
 def test_the_probability_of_the_misfit_is_uniform_where_the_model_holds(swept):
     """At ordinary noise, of 100 records; at one in ten thousand."""
     ideal = in_contact(swept).isel(sample=slice(None, None, 3))
-    attrs = [reconstruct(m, method="constrained").attrs for m in noisy_records(ideal, FAMILIAR, 100)]
+    attrs = [reconstruct(m, method="constrained").attrs for m in noisy_records(ideal, CELL, 100)]
     assert kstest([a["misfit_probability"] for a in attrs], "uniform").pvalue > 1e-4
 
 
 def test_the_attributes_sum_up_the_misfits(swept):
-    contacts = reconstruct(FAMILIAR.measure(swept, rng=1), method="constrained")
+    contacts = reconstruct(CELL.measure(swept, rng=1), method="constrained")
     clear = contacts.edge_distance.values > 3.0
     assert contacts.attrs["misfit_samples"] == clear.sum()
     assert contacts.attrs["misfit_sum"] == pytest.approx(contacts.misfit.values[clear].sum(), rel=1e-12)
     shared = LoadCell(force_noise=0.05, moment_noise=0.02, bias_uncertainty=(0.01, 0.0, 0.0))
     contacts = reconstruct(shared.measure(swept, rng=1), method="constrained")
     assert np.isnan(contacts.attrs["misfit_probability"])
-    raw = reconstruct(FAMILIAR.measure(swept, rng=1))
+    raw = reconstruct(CELL.measure(swept, rng=1))
     assert not {"misfit", "edge_distance"} & set(raw.data_vars)
     assert "misfit_sum" not in raw.attrs
 
@@ -237,7 +236,7 @@ def test_the_misfit_tells_of_a_rig_that_is_not_as_stated(contour, true, stated):
 
 
 def test_a_tip_contact_is_at_the_tip(swept):
-    contacts = reconstruct(FAMILIAR.measure(swept, rng=1), method="constrained")
+    contacts = reconstruct(CELL.measure(swept, rng=1), method="constrained")
     tip = contacts.contact_phase.values == "tip"
     assert tip.sum() > 10
     assert (contacts.contact_arclength.values[tip] == 1.0).all()
@@ -271,7 +270,7 @@ def lone(moment, force_x, force_y, angle=1.2):
 @METHODS
 def test_a_weak_load_is_nonlinear(method):
     """Twice the noise of the forces, and of the moment."""
-    weak = reconstruct(lone(0.04, 0.0, 0.1), method=method, rig=Rig(load_cell=FAMILIAR))
+    weak = reconstruct(lone(0.04, 0.0, 0.1), method=method, rig=Rig(load_cell=CELL))
     assert weak.status.item() in ("no contact", "nonlinear")
     exact = LoadCell(force_noise=5e-3, moment_noise=2e-3)
     strong = reconstruct(lone(0.4, 0.0, 1.0), method=method, rig=Rig(load_cell=exact))
@@ -282,10 +281,10 @@ def test_a_weak_load_is_nonlinear(method):
 def test_samples_near_the_edge_are_at_the_edge(swept):
     """About the change from tip to tangential contact, and nowhere else."""
     record = in_contact(swept)
-    words = np.stack([reconstruct(m, method="constrained").status.values for m in noisy_records(record, FAMILIAR, 20)])
+    words = np.stack([reconstruct(m, method="constrained").status.values for m in noisy_records(record, CELL, 20)])
     share = (words == "between phases").mean(axis=0)
     assert share.max() > 0.5
-    ideal = reconstruct(record, method="constrained", rig=Rig(load_cell=FAMILIAR))
+    ideal = reconstruct(record, method="constrained", rig=Rig(load_cell=CELL))
     assert (share[ideal.edge_distance.values > 6.0] == 0.0).all()
     assert (share > 0.0).sum() < 0.3 * share.size
 
@@ -307,7 +306,7 @@ WITHOUT_VARIANCE = ["method='raw'", "degrees of freedom"]
         (None, NOISELESS),
         (LoadCell(force_noise=0.05), NOISELESS),
         (LoadCell(moment_noise=0.02), NOISELESS),
-        (replace(FAMILIAR, degrees_of_freedom=2.0), WITHOUT_VARIANCE),
+        (replace(CELL, degrees_of_freedom=2.0), WITHOUT_VARIANCE),
     ],
 )
 def test_the_constrained_method_needs_the_variance_of_every_channel(swept, load_cell, named):
@@ -331,7 +330,7 @@ def assert_same(one, other, tolerance=1e-9, signs=None):
 @pytest.mark.parametrize("frame", ["fixed", "turning"])
 def test_a_mirrored_record_has_mirrored_contacts(method, frame):
     record = scan(paper_profile("II", q=0.5), direction="forward", drive_step=0.05).record
-    load_cell = replace(FAMILIAR, drive_angle_noise=0.003, correlation=(0.5, -0.3, 0.2))
+    load_cell = replace(CELL, drive_angle_noise=0.003, correlation=(0.5, -0.3, 0.2))
     measured = load_cell.measure(in_frame(record, frame), rng=1)
     # Seen in the turning frame, what points along the rod is mirrored onto itself, and what points across it is not.
     m, x, y = signs = (-1.0, -1.0, 1.0) if frame == "fixed" else (-1.0, 1.0, -1.0)
@@ -351,7 +350,7 @@ def test_a_mirrored_record_has_mirrored_contacts(method, frame):
 
 @METHODS
 def test_the_order_of_samples_does_not_matter_for_white_noise(swept, method):
-    measured = FAMILIAR.measure(swept.assign(sweep=swept.sweep), rng=1)
+    measured = CELL.measure(swept.assign(sweep=swept.sweep), rng=1)
     order = np.random.default_rng(1).permutation(measured.sizes["sample"])
     shuffled = reconstruct(measured.isel(sample=order), method=method)
     assert_same(shuffled, reconstruct(measured, method=method).isel(sample=order))
@@ -360,7 +359,7 @@ def test_the_order_of_samples_does_not_matter_for_white_noise(swept, method):
 @METHODS
 @pytest.mark.parametrize("bad", [(5.0, 0.0, 1.0), (30.0, 30.0, 30.0)])
 def test_one_bad_sample_leaves_the_others_as_they_are(swept, method, bad):
-    measured = FAMILIAR.measure(swept, rng=1)
+    measured = CELL.measure(swept, rng=1)
     place = pick(swept, "tip")
     spoiled = measured.copy(deep=True)
     for name, value in zip(CHANNELS, bad, strict=True):

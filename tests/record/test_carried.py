@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record import carried_sweeps, travels_of
@@ -14,7 +15,6 @@ THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1
 BACK = tb.Translation(base=(-0.8, 0.0), heading=0.0, drive_angle=1.2, travel=1.6)
 SHORT = tb.Translation(base=(0.6, 0.0), heading=np.pi, drive_angle=1.2, travel=1.2)
 MOTION = tb.Motion(x=[0.8, -0.8], y=0.0, drive_angle=[0.9, 1.7])
-CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 ROD = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
 
 

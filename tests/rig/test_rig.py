@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from helpers.tasks import through_a_pipe
 from tactile_bayes.contours import Parabola
@@ -22,7 +23,6 @@ from tactile_bayes.rig.stated import Stated
 from tactile_bayes.rig.unknown import expanded
 from tactile_bayes.sweep import scan
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
 ALL = tuple(name for group in STANDARD if group not in ("rest_shape", "taper_error") for name in members(group))
 TRACED = Rod(rest_shape_modes=(lambda s: 0.2 * (1.0 - s), lambda s: 0.1 * s))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +26,7 @@ from tactile_bayes.record import CHANNELS, rod_of
 from tactile_bayes.rig.parameters import COMPLIANCES, MEMORY, STANDARD
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.rig.unknown import DEFAULT
-from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
+from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store, versions_of
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
@@ -70,7 +69,7 @@ class _Study:
             "probability": repr(self.probability),
             "seed": seed_words(self.seed),
             "settings": repr(_SETTINGS),
-            "version of tactile-bayes": version("tactile-bayes"),
+            **versions_of("tactile-bayes"),
         }
 
 

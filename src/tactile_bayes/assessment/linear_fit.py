@@ -144,7 +144,7 @@ class Linearisation:
 
     def _costs(self, readings: Floats, points: Floats) -> Floats:
         """Return the least-squares costs of points, shape (records,), by the load cell alone; infinite out of reach."""
-        here, usable = self._readings(points)
+        here, usable = self.model.readings(points)
         costs = np.full(len(points), np.inf)
         for k in np.flatnonzero(usable):
             residuals = self._whitening(points[k], here[k], None)[0](self._off(readings[k], here[k]))
@@ -162,7 +162,7 @@ class Linearisation:
         turns = np.zeros(many.shape[:2])
         if encoder:
             turns[:, -2:] = _TURN, -_TURN
-        flat, usable = self._readings(many.reshape(-1, many.shape[-1]), turns.ravel())
+        flat, usable = self.model.readings(many.reshape(-1, many.shape[-1]), turns.ravel())
         values = flat.reshape(*many.shape[:2], *flat.shape[1:])
         is_usable = usable.reshape(turns.shape)[:, 0]
         every = zip(readings, points, values, is_usable, strict=True)
@@ -201,12 +201,3 @@ class Linearisation:
         if white.together is not None:  # errors that samples share make it costly
             self._shared = white
         return white, noise
-
-    def _readings(self, points: Floats, turns: Floats | float = 0.0) -> tuple[Floats, Flags]:
-        """Return expected readings, shape (points, samples, 3), and which points the rod reaches, shape (points,)."""
-        model = self.model
-        rig = model.rig(points)
-        rig = rig._replace(drive_angle_offset=np.asarray(rig.drive_angle_offset) - turns)
-        loads, usable = model.likelihood.predict(model.contours(points), rig)
-        loads = model.unknowns.sensed(loads, model.values(points), model.likelihood.load_cell)
-        return model.likelihood.load_cell.expected(loads), usable

@@ -6,9 +6,8 @@ import hashlib
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -43,7 +42,7 @@ from tactile_bayes.inference.stored_experiment import points_of, predicted_point
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words, words
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.tasks import Workers, keep_outcomes, open_results_store
+from tactile_bayes.tasks import FieldsAlone, Workers, keep_outcomes, open_results_store, versions_of
 from tactile_bayes.uncertainty.band import contour_band
 
 # As in `calibrate`, with more steps: shape-free posteriors take some thousand.
@@ -71,7 +70,7 @@ class JointModel(ContourModel):
 
 
 @dataclass(frozen=True, eq=False)
-class PosteriorExperiment:
+class PosteriorExperiment(FieldsAlone):
     """A record with its posterior, and truths and records drawn from that."""
 
     experiment: Experiment
@@ -82,10 +81,6 @@ class PosteriorExperiment:
     probability: float  # probability of the intervals that are tested
     seed: Seed
     settings: SamplerSettings
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields alone: the model is built again where it is needed."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def model(self) -> ContourModel:
@@ -107,7 +102,7 @@ class PosteriorExperiment:
             "probability": repr(self.probability),
             "seed": seed_words(self.seed),
             "settings": repr(self.settings),
-            "version of tactile-bayes": version("tactile-bayes"),
+            **versions_of("tactile-bayes"),
         }
 
 

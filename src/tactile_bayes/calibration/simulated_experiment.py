@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from importlib.metadata import version
-from typing import Any
 
 import xarray as xr
 
@@ -21,12 +19,13 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record import rod_of
 from tactile_bayes.sweep import Drive
+from tactile_bayes.tasks import FieldsAlone, versions_of
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedExperiment:
+class SimulatedExperiment(FieldsAlone):
     """Simulation of a record and inference from it; `calibrate` describes the entries."""
 
     # Assumptions of inference, on a template whose drive angles are readings of an encoder without errors.
@@ -50,10 +49,6 @@ class SimulatedExperiment:
         assumed, simulated = (rod_of(each.record).is_dimensionless for each in (self.assumed, self.simulated))
         if assumed != simulated:
             raise ParameterError("one of the rods of rig and truth is dimensionless: give both in the same units")
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields alone: the model is built again where it is needed."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def simulated(self) -> Experiment:
@@ -106,7 +101,7 @@ class SimulatedExperiment:
             "probability": repr(self.probability),
             "seed": seed_words(self.seed),
         }
-        return entries | self._differences | {f"version of {name}": version(name) for name in _LIBRARIES}
+        return entries | self._differences | versions_of(*_LIBRARIES)
 
 
 def _in_words(settings: SamplerSettings) -> str:

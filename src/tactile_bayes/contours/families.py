@@ -112,14 +112,12 @@ def _size(meaning: str, scale: float, length_power: int = 1) -> FamilyParameter:
     return FamilyParameter(meaning, length_power, log_normal(1.0, scale), (0.0, np.inf))
 
 
-_A = "coefficient a, or horizontal half-axis of an ellipse"
-
 # Flanks by name; any two make a joined family.
 FLANKS: dict[str, Flank] = {
     # Radius of curvature at the vertex, 1/(2a), like the circle's: half a rod length within a factor of e.
     "parabola": Flank(
         Parabola,
-        {"a": _size(_A, 1.0, -1)},
+        {"a": _size("half the curvature at the vertex", 1.0, -1)},
         start=lambda a: {"a": a},
         miss=lambda u, v, values: values["a"] * u * u - v,
         is_always_clear=True,
@@ -133,7 +131,7 @@ FLANKS: dict[str, Flank] = {
     ),
     "ellipse": Flank(
         Ellipse,
-        {"a": _size(_A, 0.5), "b": _size("vertical half-axis", 0.5)},
+        {"a": _size("horizontal half-axis", 0.5), "b": _size("vertical half-axis", 0.5)},
         start=lambda a: {"a": 0.5 / a, "b": 0.5 / a},
         miss=_ellipse_miss,
     ),

@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
-from tactile_bayes.record import CHANNELS, turned
+from tactile_bayes.record import CHANNELS, loads_of, turned
 
 _OF_ENCODER = ("drive_angle_offset", "drive_angle_backlash", "drive_angle_noise")
 # Entries of a data sheet whose validity does not depend on the others: field, and position in it.
@@ -61,7 +61,7 @@ def measure(
         sample["truth_drive_angle"] = sample["drive_angle"].copy()
     sample |= {name: np.empty_like(sample["drive_angle"]) for name in CHANNELS}
     for rows in spec.blocks(count):
-        loads = np.stack([sample[f"truth_{name}"][rows] for name in CHANNELS], axis=-1)
+        loads = loads_of({name: sample[name][rows] for name in sample}, "truth_")
         if spec.frame == "turning":
             loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], sample["drive_angle"][rows])
             for k, name in enumerate(CHANNELS):

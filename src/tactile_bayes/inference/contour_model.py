@@ -168,6 +168,13 @@ class ContourModel:
         loads, _ = self.likelihood.predict(self.contours(points), self.rig(points))
         return self.unknowns.sensed(loads, self.values(points), self.likelihood.load_cell)
 
+    def readings(self, points: Floats, turned: Floats | float = 0.0) -> tuple[Floats, Flags]:
+        """Return expected readings, (n, samples, 3), and usable points; drive angles are `turned` further, (n,)."""
+        rig, cell = self.rig(points), self.likelihood.load_cell
+        rig = rig._replace(drive_angle_offset=np.asarray(rig.drive_angle_offset) - turned)
+        loads, usable = self.likelihood.predict(self.contours(points), rig)
+        return cell.expected(self.unknowns.sensed(loads, self.values(points), cell)), usable
+
     def loads_and_events(self, points: Floats) -> tuple[Floats, Floats]:
         """Return `loads`, and events as `RecordLikelihood.predict_with_events`; points of the same path share it."""
         _, first, path = np.unique(points[:, self.of_path], axis=0, return_index=True, return_inverse=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.metadata import version
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -24,6 +23,7 @@ from tactile_bayes.reconstruction import (
     sides_and_doubts,
     with_sides,
 )
+from tactile_bayes.tasks import versions_of
 
 _MOST_DOUBTFUL = 2  # sweeps of which both sides are tried, the most doubtful first: each doubles the problems
 _BELIEVED = float(np.log(10.0))  # log prior odds that the direction of a doubtful sweep states its side of contact
@@ -49,9 +49,7 @@ class ContourProblem(NamedTuple):
 def identity_of(about: Mapping[str, Any]) -> dict[str, str]:
     """Return the attributes of a posterior, and the version, as the identity of a computation that can be resumed."""
     labels = {"data_sha256": "record (its SHA-256)"}
-    return {labels.get(name, name): str(value) for name, value in about.items()} | {
-        "version of tactile-bayes": version("tactile-bayes")
-    }
+    return {labels.get(name, name): str(value) for name, value in about.items()} | versions_of("tactile-bayes")
 
 
 def contour_problem(experiment: Experiment) -> ContourProblem:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -25,12 +25,13 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.record.attributes import rod_attributes
 from tactile_bayes.rig import Rig
+from tactile_bayes.tasks import FieldsAlone
 
 _WHOLE = "whole_sha256"  # attribute of a shortened record: the hash of the whole one
 
 
 @dataclass(frozen=True, eq=False)
-class Experiment:
+class Experiment(FieldsAlone):
     """A record, or a template, its rig and the family of its contour, with priors of all unknown parameters.
 
     With a `gauge`, the contour is known. `events` says whether unloaded samples count, as in `SamplerSettings`.
@@ -47,10 +48,6 @@ class Experiment:
         object.__setattr__(self, "record", with_rod(validate(self.record), self.rig.rod))
         object.__setattr__(self, "family", family_of(self.family))
         object.__setattr__(self, "events", check_switch("events", self.events))
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields alone: the model is built again where it is needed."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def noise(self) -> Noise:

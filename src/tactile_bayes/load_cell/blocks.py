@@ -10,7 +10,7 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.load_cell.contact_bounds import ContactBounds
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import loads_of
 
 BEFORE_ONSET, IN_CONTACT, AFTER_CONTACT = 1, 2, 3  # parts of a sweep, as far as they are certain; 0 is none of them
 _LOG_2PI = float(np.log(2.0 * np.pi))
@@ -37,7 +37,7 @@ class Blocks(NamedTuple):
         if not are_blocks(record):
             return None
         readings, freedom = (record[f"block_{name}"].values.astype(float) for name in ("readings", "freedom"))
-        scatter = np.stack([record[f"block_scatter_{name}"].values for name in CHANNELS], axis=-1)
+        scatter = loads_of(record, "block_scatter_")
         return cls(readings, freedom, scatter / np.square(rod.load_units))
 
     def log_density_within(self, deviation: Floats, present: Flags, *, pointwise: bool) -> Floats:

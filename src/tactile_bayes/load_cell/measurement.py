@@ -14,7 +14,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.load_cell.data_sheet import CERTAIN, DataSheet
-from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, present_channels, validate
+from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, loads_of, present_channels, validate
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 
 _PREFIX = "load_cell_"
@@ -29,7 +29,7 @@ def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator, zer
     made = validate(record if sheet.frame is None else in_frame(record, sheet.frame))
     entries = _after(sheet, stated_entries(made)).entries()
     present = present_channels(made)
-    readings = corrupted_loads(sheet, np.stack([made[name].values for name in CHANNELS], axis=-1), rng, zeros=zeros)
+    readings = corrupted_loads(sheet, loads_of(made), rng, zeros=zeros)
     for index, channel in enumerate(CHANNELS):
         if channel not in present:
             continue
@@ -66,7 +66,7 @@ def corrected(sheet: DataSheet, record: xr.Dataset) -> xr.Dataset:
             "the load cell has cross-talk from a channel that the record misses: its gain and lever cannot be taken "
             "out; infer_contour works without"
         )
-    loads = np.stack([corrected[CHANNELS[i]].values for i in present], axis=-1) - np.array(sheet.bias)[present]
+    loads = loads_of(corrected)[:, present] - np.array(sheet.bias)[present]
     if any(getattr(sheet, name) != getattr(ideal, name) for name in ("gain", "lever", "moment_curve")):
         loads = sheet.loads_of(loads, np.array(present))
     for values, index in zip(loads.T, present, strict=True):

@@ -20,7 +20,7 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.planning.plan import SAMPLE_COLUMNS, Plan
-from tactile_bayes.record import CHANNELS, COLUMNS, carried_sweeps, travel_unit, travels_of
+from tactile_bayes.record import CHANNELS, COLUMNS, carried_sweeps, loads_of, travel_unit, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
 from tactile_bayes.rig.stated import cell_with
 from tactile_bayes.sweep import Rotation
@@ -141,7 +141,7 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
     rod = plan.rig.known_rod
     cell = cell_with(plan.cell, plan.rig.known).dimensionless(rod)
     units = rod.load_units
-    loads = np.stack([record[name].values for name in CHANNELS], axis=-1) / units
+    loads = loads_of(record) / units
     angle = record.drive_angle.values
     turn, leaning = np.broadcast_to(np.eye(3), (angle.size, 3, 3)), np.zeros_like(loads)
     in_cell = loads

@@ -7,7 +7,6 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Any, Literal
 
 import numpy as np
@@ -33,7 +32,7 @@ from tactile_bayes.planning.knowledge import Knowledge, known_from_posterior, kn
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive, Rotation, drives_of, recorded_drives
-from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
+from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store, versions_of
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy")
 
@@ -296,7 +295,7 @@ def _identity(question: Question) -> dict[str, str]:
         "probability": repr(question.probability),
         "nested": repr(question.nested),
         "seed": seed_words(question.seed),
-        **{f"version of {name}": version(name) for name in _LIBRARIES},
+        **versions_of(*_LIBRARIES),
     }
 
 

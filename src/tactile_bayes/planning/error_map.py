@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from itertools import product
 from typing import Any
 
@@ -36,7 +35,7 @@ from tactile_bayes.planning.knowledge import unmeasured
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Rotation
-from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
+from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store, versions_of
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee")
 
@@ -223,7 +222,7 @@ def _identity(task: MapTask) -> dict[str, str]:
         "posteriors": json.dumps(dict(task.posteriors)),
         "probability": repr(task.probability),
         "seed": seed_words(task.seed),
-        **{f"version of {name}": version(name) for name in _LIBRARIES},
+        **versions_of(*_LIBRARIES),
     }
 
 

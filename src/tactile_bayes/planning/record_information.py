@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -53,18 +54,23 @@ def reading_slopes(model: ContourModel, point: Floats, step: float = STEP) -> Re
             "or the length of the rod"
         )
     loads = model.loads(point[None])[0]
-    scale = _noise_or_one(cell)
+    scale = np.where(cell.noise > 0.0, cell.noise, 1.0)
 
-    def readings(points: Floats) -> Floats:
-        whole = np.hstack([points, np.broadcast_to(point[count:], (len(points), point.size - count))])
-        return (cell.expected(model.loads(whole)) / scale).reshape(len(points), -1)
+    def slopes(readings: Callable[[Floats], Floats], at: Floats, steps: Floats | float) -> Floats:
+        flat = central_slopes(lambda moved: (readings(moved) / scale).reshape(len(moved), -1), at, steps)
+        return np.asarray(flat.reshape(*loads.shape, at.size) * scale[:, None])
+
+    def moved(points: Floats) -> Floats:
+        return model.readings(np.hstack([points, np.broadcast_to(point[count:], (len(points), point.size - count))]))[0]
+
+    def turned(angles: Floats) -> Floats:
+        return model.readings(np.repeat(point[None], len(angles), axis=0), angles[:, 0])[0]
 
     steps = step * parameter_scales(model, point)[:count]
     # A parameter at its bound, like zero friction, is evaluated one step inside.
     inside = np.clip(point[:count], model.low[:count] + steps, model.high[:count] - steps)
-    slopes = central_slopes(readings, inside, steps).reshape(len(loads), len(CHANNELS), count)
-    by_angle = _by_angle(model, point) if cell.drive_angle_deviation else np.zeros_like(loads)
-    return ReadingSlopes(loads, slopes * scale[:, None], by_angle)
+    by_angle = slopes(turned, np.zeros(1), STEP)[..., 0] if cell.drive_angle_deviation else np.zeros_like(loads)
+    return ReadingSlopes(loads, slopes(moved, inside, steps), by_angle)
 
 
 def record_information(
@@ -133,23 +139,3 @@ def parameter_scales(model: ContourModel, point: Floats) -> Floats:
         sizes = [size for size in (abs(float(value)), float(model.priors[name].std())) if 0.0 < size < np.inf]
         scales.append(min(sizes) if sizes else 1.0)
     return np.array(scales)
-
-
-def _by_angle(model: ContourModel, point: Floats) -> Floats:
-    """Return the derivatives of the readings by the drive angle, shape (samples, 3)."""
-    cell, scale = model.likelihood.load_cell, _noise_or_one(model.likelihood.load_cell)
-
-    def readings(angles: Floats) -> Floats:
-        points = np.repeat(point[None], len(angles), axis=0)
-        rig = model.rig(points)
-        rig = rig._replace(drive_angle_offset=np.asarray(rig.drive_angle_offset) - angles[:, 0])
-        loads, _ = model.likelihood.predict(model.contours(points), rig)
-        return np.asarray((cell.expected(loads) / scale).reshape(len(angles), -1))
-
-    slopes = central_slopes(readings, np.zeros(1), STEP)
-    return np.asarray(slopes.reshape(-1, len(CHANNELS)) * scale)
-
-
-def _noise_or_one(cell: LoadCell) -> Floats:
-    """Return the scale of the readings of each channel, shape (3,): its noise, or 1 if it states none."""
-    return np.where(cell.noise > 0.0, cell.noise, 1.0)

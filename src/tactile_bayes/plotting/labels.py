@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.diagnostics.findings import prefix_of
 from tactile_bayes.record import COLUMNS
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ DRIVE_ANGLE = f"{LABELS['drive_angle']} [°]"
 _DIMENSIONLESS = {"length_unit": "$L$", "moment_unit": "$EI$/$L$", "force_unit": "$EI$/$L^2$"}
 # Ticks in a decade of a logarithmic axis, by the largest number of decades.
 _TICKS = {0.9: (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0), 2.2: (1.0, 2.0, 5.0), np.inf: (1.0,)}
-_PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
 
 
 def set_unit(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values: Floats) -> None:
@@ -64,8 +64,8 @@ def shown_unit(name: str, attrs: Mapping[Any, Any], values: Floats) -> tuple[int
     if unit == "1":
         return 0, _DIMENSIONLESS[column.scale] if column.scale else ""
     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values)) if unit == column.unit else 0.0
-    power = int(np.clip(3 * np.floor(np.log10(largest) / 3), -9, 0)) if largest > 0.0 else 0
-    return power, f"{_PREFIXES[power]}{unit}"
+    size, prefix = prefix_of(largest)
+    return round(np.log10(size)), f"{prefix}{unit}"
 
 
 def number(value: float, power: int = 0, *, digits: int = 6) -> str:

@@ -15,7 +15,7 @@ from tactile_bayes.mechanics.contacts.fits import Reading
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction.sides import contact_sides
-from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
+from tactile_bayes.record import CHANNELS, frame_of, loads_of, present_channels, rod_of, turned
 from tactile_bayes.record.frame import to_fixed_axes
 
 FALSE_ALARM = 1e-3  # share of unloaded samples that count as loaded because of noise
@@ -62,14 +62,14 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         )
     rod = rod_of(measured)
     loaded = loaded_samples(measured, cell)
-    readings = np.stack([measured[name].values for name in CHANNELS], axis=-1)
+    readings = loads_of(measured)
     cut_off: Flags = np.any(cell.cuts_off(readings), axis=-1)
     corrected = cell.corrected(measured)
     side = contact_sides(corrected, cell)
     units = rod.load_units
     angle = corrected.drive_angle.values
     with np.errstate(over="ignore", invalid="ignore"):  # an infinite load has no zero of curvature
-        loads = np.stack([corrected[name].values for name in CHANNELS], axis=-1) / units
+        loads = loads_of(corrected) / units
         loads[~loaded] = 0.0
         cell = cell.dimensionless(rod)
         has_noise = bool(np.any(cell.unrest) or cell.relative_noise or cell.drive_angle_deviation)

@@ -15,6 +15,7 @@ from tactile_bayes.record.schema import (
     Column,
     Frame,
     column_of,
+    loads_of,
     present_channels,
 )
 from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps, rows_of_sweeps, travel_unit, travels_of
@@ -36,6 +37,7 @@ __all__ = [
     "column_of",
     "frame_of",
     "in_frame",
+    "loads_of",
     "means_of_positions",
     "positions_of",
     "present_channels",

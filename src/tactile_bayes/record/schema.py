@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations, product
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+
+from tactile_bayes.arrays import Floats
 
 Frame = Literal["fixed", "turning"]
 Kind = Literal["integer", "number", "text"]
@@ -139,3 +141,8 @@ def column_attributes(name: str, units: str) -> dict[str, str]:
 def present_channels(record: xr.Dataset) -> tuple[str, ...]:
     """Return the channels of a record that are not NaN throughout."""
     return tuple(name for name in CHANNELS if not np.isnan(record[name].values).all())
+
+
+def loads_of(record: xr.Dataset | Mapping[str, Any], prefix: str = "") -> Floats:
+    """Return the columns of a record's channels, of names that begin with `prefix`, as one array, shape (..., 3)."""
+    return np.stack([np.asarray(record[f"{prefix}{name}"]) for name in CHANNELS], axis=-1)

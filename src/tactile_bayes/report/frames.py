@@ -15,7 +15,7 @@ from tactile_bayes.inference.result import best_draw, record_of
 from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
-from tactile_bayes.record import rod_of, rows_of_sweeps
+from tactile_bayes.record import loads_of, rod_of, rows_of_sweeps
 from tactile_bayes.rig.stated import rod_with
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
 
@@ -72,7 +72,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Frames:
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
     sign = np.where(mirrored, -1.0, 1.0)
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
-    loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
+    loads = loads_of(in_lab_frame)
     starts = np.stack([paths.sweep_frame.base_x, paths.sweep_frame.base_y], axis=-1)
     bases = np.stack([record["base_x"].values, record["base_y"].values], axis=-1)[samples]
     base_x, base_y = (starts[batch_index] + bases - likelihood.segments.bases[batch_index]).T

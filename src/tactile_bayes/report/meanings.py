@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.rig.parameters import parameter_named
 
 FORMULAS = {
@@ -12,32 +13,16 @@ FORMULAS = {
     "shape-free": "any smooth contour: log radius of curvature is a random function of the slope angle",
 }
 
-_MEANINGS = {
-    "q": "height of the lowest point",
-    "x_c": "x of the lowest point",
-    "r": "radius",
-    "b": "semi-axis in y",
-    "w": "half-width at which the height equals it",
-    "n": "exponent",
-    "amplitude": "standard deviation of the logarithm of the radius along the contour",
-    "length_scale": "correlation length of that logarithm in slope angle",
-    "gap width": "width of the arc that no sweep touches",
-}
-_A = {"parabola": "half the curvature of the lowest point", "ellipse": "semi-axis in x"}
-_R = {"shape-free": "mean radius of curvature (geometric)"}
-
 
 def meaning_of(name: str, family: str) -> str:
     """Return the meaning of a parameter of a contour, of its rig, or of the noise."""
-    if of_rig := parameter_named(name):
-        return of_rig.meaning
-    if is_direction(name):
-        return "a direction of the random function"
-    flanks = family.partition("/")
-    for side, flank in (("left", flanks[0]), ("right", flanks[2])):
-        if name.startswith(f"{side}_"):
-            return f"{side} flank: {meaning_of(name.removeprefix(f'{side}_'), flank)}"
-    return {"a": _A.get(family), "r": _R.get(family)}.get(name) or _MEANINGS.get(name, "")
+    if name == "gap width":
+        return "width of the arc that no sweep touches"
+    table = FAMILIES[family].table if family in FAMILIES else {}
+    if found := parameter_named(name) or table.get(name):
+        side = next((f"{side} flank: " for side in ("left", "right") if name.startswith(f"{side}_")), "")
+        return side + found.meaning
+    return ""
 
 
 def is_direction(name: str) -> bool:

@@ -8,11 +8,19 @@ from tactile_bayes.tasks.files import (
     replace_together,
     write_atomically,
 )
-from tactile_bayes.tasks.results_store import Kind, ResultsStore, keep_outcomes, open_results_store
+from tactile_bayes.tasks.results_store import (
+    FieldsAlone,
+    Kind,
+    ResultsStore,
+    keep_outcomes,
+    open_results_store,
+    versions_of,
+)
 from tactile_bayes.tasks.threads import in_parts, one_thread
 from tactile_bayes.tasks.workers import TaskProgress, Workers, run_tasks, workers_of
 
 __all__ = [
+    "FieldsAlone",
     "Kind",
     "ResultsStore",
     "TaskProgress",
@@ -27,6 +35,7 @@ __all__ = [
     "refuse_replacing",
     "replace_together",
     "run_tasks",
+    "versions_of",
     "workers_of",
     "write_atomically",
 ]

@@ -7,6 +7,8 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
+from dataclasses import fields
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -37,6 +39,18 @@ class Kind(NamedTuple):
     @property
     def file(self) -> str:
         return f"{self.what}.json"
+
+
+class FieldsAlone:
+    """Dataclass that is sent to workers as its fields alone: what is made of them is made again where it is needed."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}  # type: ignore[arg-type]
+
+
+def versions_of(*libraries: str) -> dict[str, str]:
+    """Return the versions of libraries on which results depend, as entries of their identity."""
+    return {f"version of {name}": version(name) for name in libraries}
 
 
 class ResultsStore(Generic[Outcome]):

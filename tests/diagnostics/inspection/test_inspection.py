@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tactile_bayes as tb
+from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.inspection import known_cell
@@ -97,16 +98,15 @@ def test_nothing_is_said_of_a_good_record(record):
     assert found.sweeps.unloaded.values.sum() == found.samples.unloaded.values.sum()
 
 
-USUAL = LoadCell(force_noise=0.05, moment_noise=0.02)
 CELLS = {
-    "usual": USUAL,
+    "usual": CELL,
     "poor": LoadCell(force_noise=0.2, moment_noise=0.08, bias=(0.3, 0.1, -0.4)),
-    "steps": replace(USUAL, force_resolution=0.05, moment_resolution=0.02),
+    "steps": replace(CELL, force_resolution=0.05, moment_resolution=0.02),
     "coarse": LoadCell(force_noise=0.02, moment_noise=0.01, force_resolution=0.1, moment_resolution=0.05),
-    "turning": replace(USUAL, drive_angle_noise=3e-3, frame="turning"),
-    "drift": replace(USUAL, drift=tb.load_cell.RandomWalk(moment=2e-3, force=5e-3)),
+    "turning": replace(CELL, drive_angle_noise=3e-3, frame="turning"),
+    "drift": replace(CELL, drift=tb.load_cell.RandomWalk(moment=2e-3, force=5e-3)),
     # Gain beside which the noise of loads is five times that of readings.
-    "faint": replace(USUAL, gain=((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))),
+    "faint": replace(CELL, gain=((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))),
 }
 
 
@@ -131,7 +131,7 @@ def test_nothing_is_said_of_a_scan_nor_of_a_record_with_missing_channels(ideal, 
 def test_false_alarms_are_as_rare_as_stated():
     """Of 400 good records some 0.1 % to 1 % may be suspected; more than 8 has a probability below 0.03 at 1 %."""
     records = [tb.scan(tb.contours.paper_profile(name, q=0.5)).record for name in ("I", "II", "III", "IV")]
-    measured = (bare(USUAL.measure(records[seed % 4], rng=seed)) for seed in range(400))
+    measured = (bare(CELL.measure(records[seed % 4], rng=seed)) for seed in range(400))
     assert sum(tb.inspect_record(record).is_suspect for record in measured) <= 8
 
 

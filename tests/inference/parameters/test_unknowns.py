@@ -19,7 +19,7 @@ from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihoo
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.rig.parameters import GROUPS
@@ -99,10 +99,6 @@ def coarse():
 def stack(count=1):
     """So many contours, all of them the true one."""
     return Parabola(*(np.full(count, value) for value in TRUTH.values()))
-
-
-def loads_of(record):
-    return np.stack([record[name].values for name in CHANNELS], axis=-1)
 
 
 @pytest.mark.parametrize("frame", ["fixed", "turning"])

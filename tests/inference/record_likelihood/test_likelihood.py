@@ -18,7 +18,7 @@ from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, in_frame, rod_of
+from tactile_bayes.record import CHANNELS, in_frame, loads_of, rod_of
 from tactile_bayes.record.units import with_rod
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Motion, Translation, scan
@@ -49,7 +49,7 @@ def exact_loads(record, contour, friction=0.0):
         given = np.isin(angles, other.drive_angle.values)
         assert given.all() or (friction and rod_of(record).rest_curvature and np.mean(given) > 0.9)
         np.testing.assert_array_equal(other.drive_angle.values, angles[given])
-        out[rows[given]] = np.stack([other[name].values for name in CHANNELS], axis=-1)
+        out[rows[given]] = loads_of(other)
     return out
 
 
@@ -116,7 +116,7 @@ def test_against_an_independent_sum(rig):
     scale = np.array([1.0, 1.3])
     for missing in ((), ("force_x", "force_y"), ("holding_moment",)):
         measured = without(whole, *missing)
-        values = np.stack([measured[name].values for name in CHANNELS], axis=-1)
+        values = loads_of(measured)
         present = ~np.isnan(values[0])
         deviation = np.array([cell.standard_deviations[name] for name in CHANNELS])[present]
         units = rod.load_units[present]

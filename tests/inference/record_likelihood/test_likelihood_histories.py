@@ -11,13 +11,8 @@ from helpers.contour_posteriors import CELL
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import loads_of
 from tactile_bayes.rig import Rig
-
-
-def loads_of(record):
-    return np.stack([record[name].values for name in CHANNELS], axis=-1)
-
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 SHIFTS = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6)]
@@ -69,7 +64,7 @@ def test_a_drive_that_begins_in_contact_was_turned_in(friction, exact):
     likelihood = RecordLikelihood(moved, CELL, friction, exact=exact)
     loads, reached = likelihood.predict(ONE, RigValues(friction=friction))
     assert reached.all()
-    known = np.stack([moved[name] for name in CHANNELS], axis=-1)
+    known = loads_of(moved)
     np.testing.assert_allclose(loads[0], known, atol=1e-7 if exact else 1e-4)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
+from helpers.load_cells import CELL
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, Smooth
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.sweep_frame import SweepFrame
@@ -29,7 +30,6 @@ from tactile_bayes.sweep import scan
 from tactile_bayes.sweep.drive import Translation
 
 SWEEPS = "tactile_bayes.mechanics.branches.sweeps"
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 THIN = Rod()
 THICK = Rod(length=0.1, flexural_rigidity=1e-4, diameter=0.002)
 NAMES = ["parabola", "circle", "ellipse", "power-law", "parabola/power-law", "circle/ellipse"]

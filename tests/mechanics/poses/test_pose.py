@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from helpers.compiled_calls import by_number
-from helpers.integration import bent_rod
+from helpers.profiled_rods import integrated_pose, rod_along
 from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.poses import pose as compiled_pose
 
@@ -43,7 +43,7 @@ def test_a_bent_arc_is_the_integrated_one():
     """To the tolerance of the integration: m from 0.1 to beyond every bound."""
     columns = drawn()
     found = by_number(_values, 3)(*columns)
-    expected = np.array([bent_rod(*row) for row in zip(*columns, strict=True)])
+    expected = np.array([integrated_pose(rod_along(bent, 1.0, 0.0), *row) for *row, bent in zip(*columns, strict=True)])
     np.testing.assert_allclose(found, expected, rtol=0, atol=3e-12)
 
 

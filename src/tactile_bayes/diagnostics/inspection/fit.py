@@ -13,7 +13,7 @@ from tactile_bayes.diagnostics.inspection.corrections import Correction, as_it_i
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.reconstruction import contacts_of
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.rig.corrected import Corrected
 
 _FEWEST = 10  # number of loaded samples below which the fit is not judged
@@ -90,5 +90,5 @@ def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
 
 def _read_by(cell: LoadCell, loads: xr.Dataset) -> xr.Dataset:
     """Return the loads as a noise-free cell would read them, so that the cell's noise is in proportion to them."""
-    read = cell.expected(np.stack([loads[name].values for name in CHANNELS], axis=-1))
+    read = cell.expected(loads_of(loads))
     return loads.assign({name: loads[name].copy(data=read[:, index]) for index, name in enumerate(CHANNELS)})

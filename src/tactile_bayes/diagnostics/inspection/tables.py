@@ -12,6 +12,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import (
     CHANNELS,
     carried_sweeps,
+    loads_of,
     means_of_positions,
     positions_of,
     present_channels,
@@ -62,7 +63,7 @@ def sample_table(
         flags["cut_off"][:, index] = at_end
         flags["stuck"][:, index] = equal & ~at_end
     if stated is not None:
-        ends = stated.cuts_off(np.stack([record[name].values for name in CHANNELS], axis=-1))
+        ends = stated.cuts_off(loads_of(record))
         flags["cut_off"] |= ends
         flags["stuck"] &= ~ends
     twice = np.zeros(count, dtype=bool)

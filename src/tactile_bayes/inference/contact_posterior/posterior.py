@@ -22,7 +22,7 @@ from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, spawn
 from tactile_bayes.reconstruction import contacts_of, samples_of, with_likelier_senses
-from tactile_bayes.record import CHANNELS, frame_of, record_hash, validate, with_rod
+from tactile_bayes.record import CHANNELS, frame_of, loads_of, record_hash, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -183,9 +183,7 @@ def density_of(
         samples = samples._replace(reading=about.reading)
     rod = samples.rod
     units = rod.load_units
-    readings = LoneSamples(
-        cell.dimensionless(rod), np.stack([measured[name].values for name in CHANNELS], axis=-1) / units
-    )
+    readings = LoneSamples(cell.dimensionless(rod), loads_of(measured) / units)
     base = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
     turning = frame_of(measured) == "turning"
     loaded = np.flatnonzero(samples.loaded & ~samples.cut_off)

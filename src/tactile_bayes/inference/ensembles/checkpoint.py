@@ -9,7 +9,6 @@ import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, StoredSteps
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, whole_seed
-from tactile_bayes.tasks import alone_in, is_temporary, write_atomically
+from tactile_bayes.tasks import alone_in, is_temporary, versions_of, write_atomically
 from tactile_bayes.tasks.documents import read_json
 
 _START = "starting points"  # they follow from the other entries
@@ -42,7 +41,7 @@ def identity_of_run(
         "block_steps": str(settings.block_steps),
         "seed of the ensembles": whole_seed(seed),
         _START: hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
-        "version of emcee": version("emcee"),
+        **versions_of("emcee"),
     }
 
 

@@ -26,7 +26,7 @@ from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps, s
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
-from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, turned
+from tactile_bayes.record import frame_of, loads_of, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.poses.forward_table import Tables
@@ -74,7 +74,7 @@ class RecordLikelihood:
                 "drive_angle_noise or drive_angle_resolution together with drift or bias_uncertainty have no closed "
                 "form: leave one of the two out (a bias can be inferred instead, as an unknown of the rig)"
             )
-        self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
+        self.measured = loads_of(record)
         self.noise = self.load_cell.noise
         self.segments = RecordSegments(measured, load_cell, rubs or friction > 0.0)
         self._turn = self.segments.drive_angles if frame_of(record) == "turning" else None

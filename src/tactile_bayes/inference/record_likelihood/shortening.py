@@ -16,7 +16,7 @@ from tactile_bayes.load_cell.blocks import AFTER_CONTACT, BEFORE_ONSET, IN_CONTA
 from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.reconstruction import least_turn, turned_sweeps, with_sides
-from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels, rows_of_sweeps
+from tactile_bayes.record import CHANNELS, carried_sweeps, loads_of, present_channels, rows_of_sweeps
 from tactile_bayes.record.sweep_segments import turning_points
 
 MOST_SAMPLES = 2000  # largest number of samples that the likelihood takes one by one
@@ -58,7 +58,7 @@ def shortened(record: xr.Dataset, cell: LoadCell, rubs: bool = False) -> tuple[x
 
 def _averages(record: xr.Dataset, cell: LoadCell) -> bool:
     """Return True if means of readings at one load are normal, with a noise that falls as the root of their number."""
-    readings = np.stack([record[name].values for name in CHANNELS], axis=-1)
+    readings = loads_of(record)
     noise = [rough_noise(values) if step else np.inf for values, step in zip(readings.T, cell.resolution, strict=True)]
     return not (
         np.isfinite(cell.degrees_of_freedom)
@@ -132,7 +132,7 @@ class _Readings:
     def __init__(self, record: xr.Dataset, cell: LoadCell) -> None:
         self.record = record
         self.present = [CHANNELS.index(name) for name in present_channels(record)]
-        self.values = np.stack([record[name].values for name in CHANNELS], axis=-1)
+        self.values = loads_of(record)
         self.angle = record["drive_angle"].values.astype(float)
         self.groups = self._groups(RecordSegments(record, cell))
         self.found = quiet_zero_load(record)

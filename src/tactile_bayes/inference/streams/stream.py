@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Self
@@ -34,6 +33,7 @@ from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.tasks import versions_of
 
 LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # levels of the quantiles of parameters and of the band
 _MOST_SURPRISE = 700.0  # largest logarithm of an e-value that is stated, which is finite
@@ -344,7 +344,7 @@ class Stream:
             "names of parameters": ", ".join(experiment.model.names),
             "particles": str(self._particles),
             "seed": whole_seed(self._seed),
-            "version of emcee": version("emcee"),
+            **versions_of("emcee"),
         }
 
     def _random(self, purpose: int, updates: int) -> np.random.Generator:
