@@ -100,7 +100,7 @@ class ContourModel:
     @property
     def present(self) -> Flags:
         """True for channels that were measured, shape (3,)."""
-        return ~np.isnan(self.likelihood.measured).all(axis=0)
+        return np.asarray(~np.isnan(self.likelihood.measured).all(axis=0))
 
     @property
     def certainly_loaded(self) -> Flags:

@@ -265,7 +265,7 @@ class RecordLikelihood:
         assert isinstance(self.load_cell, AveragedCell)
         of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted))
         deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
-        present = ~np.isnan(self.measured).all(axis=0)
+        present = np.asarray(~np.isnan(self.measured).all(axis=0))
         return self.blocks.log_density_within(deviation, present, pointwise=pointwise)
 
     def score(
