@@ -11,6 +11,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contact_posterior.posterior import groups_of_contacts
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
@@ -20,22 +21,15 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.record import CHANNELS, record_hash, validate
-from tactile_bayes.record.schema import column_attributes
+from tactile_bayes.record import record_hash, validate
 from tactile_bayes.sweep import to_lab_frame
 
 _BLOCK = 200  # number of contours whose paths are traced at a time
-_CONSTANT = ("sweep", "direction", "base_x", "base_y")
 # Attributes of the posterior that hold for the contacts, too: of its run, and of its model.
 _OF_RUN = ("sampler", "seed", "settings", "data_sha256", "converged", "approximations")
 _OF_MODEL = ("family", "friction", "nuisances", "priors")
 # Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw.
 _ANGLE_UNKNOWNS = ("drive_angle_offset", "backlash", "suspension_compliance")
-_ATTRIBUTES = {
-    "drive_angle": {"units": "rad", "long_name": "drive angle"},
-    "tangential": {"units": "1", "long_name": "whether the contact is tangential"},
-}
-_DIMS = ("chain", "draw", "sample")
 
 
 def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree:
@@ -88,24 +82,9 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     tangential = variables["tangential"]
     number, touched = picked.sizes["chain"] * picked.sizes["draw"], np.isfinite(tangential).sum(axis=(0, 1))
     share = np.nansum(tangential, axis=(0, 1)) / np.where(touched, touched, np.nan)
-    stats = {
-        "contact_probability": ("sample", touched / number, {"units": "1"}),
-        "tangential_probability": ("sample", share, {"units": "1"}),
-    }
-    units, sample = record.attrs["units"], np.arange(record.sizes["sample"])
-    coords = {"chain": picked["chain"].values, "draw": picked["draw"].values, "sample": sample}
-    labelled = {
-        name: (_DIMS, values, _ATTRIBUTES.get(name) or column_attributes(name, units))
-        for name, values in variables.items()
-    }
-    tree = xr.DataTree.from_dict(
-        {
-            "posterior": xr.Dataset(labelled, coords=coords),
-            "sample_stats": xr.Dataset(stats, coords={"sample": sample}),
-            "observed_data": record[["drive_angle", *CHANNELS]].drop_attrs(deep=False).assign_coords(sample=sample),
-            "constant_data": record[list(_CONSTANT)].drop_attrs(deep=False).assign_coords(sample=sample),
-        }
-    )
+    stats = {"contact_probability": touched / number, "tangential_probability": share}
+    coords = {"chain": picked["chain"].values, "draw": picked["draw"].values, "sample": np.arange(touched.size)}
+    tree = xr.DataTree.from_dict(groups_of_contacts(variables, coords, stats, record))
     tree.attrs = {
         "inference_library": "tactile-bayes",
         "inference_library_version": version("tactile-bayes"),
@@ -113,7 +92,7 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
         "draws": number,
         "dependence": "a draw is one contour, and its contacts at all samples lie on it",
         "message": f"contacts of {number} contours of the posterior; {posterior.attrs['message']}",
-        "units": units,
+        "units": record.attrs["units"],
     }
     return tree
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -33,7 +34,11 @@ _MOST_DRAWS = 10**6  # largest number of draws for each sample
 # goes, and an interval of 90 % of the slope, with that at its end, holds only if that is likely.
 _SENSES = np.array([1.0, -1.0, -0.8, -0.4, 0.0, 0.4, 0.8])
 _OF_SENSES = np.array([0.8, 0.1, 0.02, 0.02, 0.02, 0.02, 0.02])
-_CONSTANT = ("sweep", "direction", "base_x", "base_y")
+_ATTRIBUTES = {
+    "drive_angle": {"units": "rad", "long_name": "drive angle"},
+    "tangential": {"units": "1", "long_name": "whether the contact is tangential"},
+}
+_DIMS = ("chain", "draw", "sample")
 
 
 def infer_contacts(
@@ -198,30 +203,34 @@ def density_of(
 
 
 def _groups(measured: xr.Dataset, density: ContactDensity, found: MixedDraws) -> dict[str, xr.Dataset]:
-    points, units = found.of_ways.points, measured.attrs["units"]
+    points = found.of_ways.points
     coordinates, _ = density.unfold(points)
-    columns = {
-        name: (values, column_attributes(name, units))
-        for name, values in zip(PLACE, density.contacts(coordinates), strict=True)
-    }
+    columns = dict(zip(PLACE, density.contacts(coordinates), strict=True))
     if density.has_free_angle:
-        angle = np.where(density.samples.side < 0.0, np.pi - coordinates[..., 3], coordinates[..., 3])
-        columns["drive_angle"] = angle, {"units": "rad", "long_name": "drive angle"}
-    is_tangential = (points[..., 0] < 0.0).astype(float)
-    columns["tangential"] = is_tangential, {"units": "1", "long_name": "whether the contact is tangential"}
-    dims, every = ("chain", "draw", "sample"), {"sample": np.arange(measured.sizes["sample"])}
+        columns["drive_angle"] = np.where(density.samples.side < 0.0, np.pi - coordinates[..., 3], coordinates[..., 3])
+    columns["tangential"] = (points[..., 0] < 0.0).astype(float)
+    picked = {name: np.take_along_axis(values, found.picked, -1) for name, values in columns.items()}
     coords = {"chain": np.arange(points.shape[0]), "draw": np.arange(points.shape[1]), "sample": found.samples}
-    variables = {
-        name: (dims, np.take_along_axis(values, found.picked, -1), attrs) for name, (values, attrs) in columns.items()
-    }
-    observed = [name for name in ("drive_angle", *CHANNELS) if name in measured]
-    stats = xr.Dataset({name: ("sample", values) for name, values in found.stats.items()}, {"sample": found.samples})
-    stats = stats.reindex(every)
+    groups = groups_of_contacts(picked, coords, found.stats, measured)
+    stats = groups["sample_stats"]
+    return groups | {"sample_stats": stats.assign(converged=stats["converged"].fillna(0.0).astype(np.int8))}
+
+
+def groups_of_contacts(
+    draws: Mapping[str, Floats], coords: Mapping[str, Any], stats: Mapping[str, Floats], record: xr.Dataset
+) -> dict[str, xr.Dataset]:
+    """Return draws of contacts by name, (chain, draw, sample), numbers of each sample, and the record, as groups."""
+    every, units = {"sample": np.arange(record.sizes["sample"])}, record.attrs["units"]
+    variables = {name: (_DIMS, v, _ATTRIBUTES.get(name) or column_attributes(name, units)) for name, v in draws.items()}
+    of_samples = xr.Dataset(
+        {name: ("sample", v, {"units": "1"}) for name, v in stats.items()}, {"sample": coords["sample"]}
+    )
+    observed = [name for name in ("drive_angle", *CHANNELS) if name in record]
     return {
-        "posterior": xr.Dataset(variables, coords=coords).reindex(every),
-        "observed_data": measured[observed].assign_coords(every),
-        "constant_data": measured[list(_CONSTANT)].assign_coords(every),
-        "sample_stats": stats.assign(converged=stats["converged"].fillna(0.0).astype(np.int8)),
+        "posterior": xr.Dataset(variables, coords).reindex(every),
+        "observed_data": record[observed].assign_coords(every),
+        "constant_data": record[["sweep", "direction", "base_x", "base_y"]].assign_coords(every),
+        "sample_stats": of_samples.reindex(every),
     }
 
 
