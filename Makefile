@@ -1,9 +1,11 @@
-# Everything runs in a virtual environment of its own, made on first use and refreshed when pyproject.toml changes.
+# Everything runs in a virtual environment of its own, made on first use and refreshed when pyproject.toml changes:
+# what tests need first, and more for linters, notebooks and documentation when they are called.
 PYTHON ?= $(shell for p in python3 python3.11 python3.12 python3.13 python3.14 python; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$p && break; done)
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+DEV_READY := $(VENV)/.dev-ready
 DOCS_READY := $(VENV)/.docs-ready
 DEMO_OUT ?= results/demo
 # Samplers for the comparison, and for nothing else.
@@ -24,7 +26,7 @@ test notebooks: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
 	$(BIN)/python -m pytest -n auto --dist worksteal --doctest-modules src tests $(TEST_OPTIONS)
 
-notebooks: $(READY)
+notebooks: $(DEV_READY)
 	$(BIN)/python -m pytest -n auto --nbmake --nbmake-timeout=1200 notebooks
 
 # With the lowest versions of the dependencies; their warnings about one another are not errors here.
@@ -32,7 +34,7 @@ test-lowest: $(READY)
 	$(PYTHON) -m venv --clear .venv-lowest
 	$(BIN)/python tools/lowest.py > .venv-lowest/lowest.txt
 	.venv-lowest/bin/python -m pip install --quiet --upgrade "pip>=25.1"
-	.venv-lowest/bin/python -m pip install --quiet --requirement .venv-lowest/lowest.txt --group dev --editable .
+	.venv-lowest/bin/python -m pip install --quiet --requirement .venv-lowest/lowest.txt --group test --editable .
 	NUMBA_CACHE_DIR=.venv-lowest/numba .venv-lowest/bin/python -m pytest -n auto -o filterwarnings=default
 
 test-slow: notebooks
@@ -87,7 +89,7 @@ dist: $(READY)
 	$(BIN)/python -m build --outdir dist
 	$(BIN)/python -m twine check --strict dist/*
 
-lint: $(READY)
+lint: $(DEV_READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -99,7 +101,11 @@ $(READY): pyproject.toml
 	@test -n "$(PYTHON)" || { echo "tactile_bayes needs Python 3.11 or later: none found. Name one with: make PYTHON=/path/to/python ..." >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --no-compile --editable . --group dev
+	$(BIN)/python -m pip install --quiet --no-compile --editable . --group test
+	touch $@
+
+$(DEV_READY): $(READY)
+	$(BIN)/python -m pip install --quiet --no-compile --group dev
 	touch $@
 
 $(DOCS_READY): $(READY)
