@@ -13,6 +13,7 @@ from hypothesis import settings
 
 from helpers.contour_posteriors import QUICK
 from helpers.forward_models import compile_share
+from helpers.report_pages import quickly, undrawn
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan
@@ -90,18 +91,17 @@ def analysed(measured, tmp_path_factory):
     return analyse(measured, folder, rig=Rig(unknown="nothing"), settings=QUICK, truth=CONTOUR, rng=1), folder
 
 
+@pytest.fixture(name="undrawn")
+def runs_without_figures():
+    with undrawn():
+        yield
+
+
 @pytest.fixture
-def quick(monkeypatch):
+def quick(undrawn):
     """Runs without figures and of few steps, whatever settings they are given."""
-    from tactile_bayes.runs import contour as run
-
-    infer = run.infer_contour
-
-    def infer_quickly(*arguments, settings=None, **options):
-        return infer(*arguments, settings=replace(QUICK, walkers=28), **options)  # enough for all that is standard
-
-    monkeypatch.setattr(run, "infer_contour", infer_quickly)
-    monkeypatch.setattr(run, "_draw", lambda *arguments, **options: {})
+    with quickly(replace(QUICK, walkers=28)):  # enough for all that is standard
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import typer
+import xarray as xr
 
 from helpers.commands import answered, call, succeed
 from helpers.interrupts import interrupted_while_sampling
@@ -44,11 +45,11 @@ def posterior(record):
 
 
 @pytest.fixture
-def at_once(monkeypatch, posterior):
-    """Runs without figures to which the posterior is given."""
-
+def at_once(monkeypatch, posterior, undrawn):
+    """Runs without figures to which the posterior is given, and of a misfit no cause."""
+    none = {name: ("cause", []) for name in ("log_evidence", "describes", "remedy", "cause")}
+    monkeypatch.setattr(contour_run, "causes", lambda *_, **__: xr.Dataset(none, attrs={"described": 0}))
     monkeypatch.setattr(contour_run, "infer_contour", lambda measured, **options: posterior.copy(deep=True))
-    monkeypatch.setattr(contour_run, "_draw", lambda *arguments, **options: {})
 
 
 def test_help_lists_the_commands_and_states_the_exit_codes():

@@ -1,11 +1,15 @@
 """Commands on a base that is carried: a translation, and a record that is turned here and carried there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import tactile_bayes as tb
 from helpers.commands import answered, call, succeed
+from helpers.contour_posteriors import QUICK
 from helpers.refusals import refused
+from helpers.report_pages import quickly
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.plotting.drive_axis import drive_axis
@@ -28,7 +32,8 @@ def run_of(folder, rig, *options):
         ("measure", ideal, "--force-noise", 0.05, "--moment-noise", 0.02, "--out", measured),
         ("infer", measured, "--family", "circle", "--rig", rig, "--out", run),
     ):
-        succeed(*arguments)
+        with quickly(replace(QUICK, walkers=28)):
+            succeed(*arguments)
     return measured, run
 
 

@@ -22,12 +22,13 @@ from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import write_record
 from tactile_bayes.rig import Rig, read_record
-from tactile_bayes.runs import contour as contour_run
 from tactile_bayes.runs import watch
 from tactile_bayes.runs.watch import open_watch
 from tactile_bayes.sweep import scan
 
 FEW = ("--particles", 120)
+
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.fixture(scope="module")
@@ -41,11 +42,6 @@ def lines(record):
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "live.csv"
-
-
-@pytest.fixture(autouse=True)
-def undrawn(monkeypatch):
-    monkeypatch.setattr(contour_run, "_draw", lambda *arguments, **options: {})
 
 
 @pytest.fixture(scope="module")

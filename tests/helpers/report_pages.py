@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from html.parser import HTMLParser
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -29,9 +30,22 @@ FOLDER = "<b onclick=alert(7)>run&lt;"
 VOID = {"meta", "input", "br", "hr", "img", "link"}
 
 
+def undrawn() -> Any:
+    """While it lasts, runs have no figures."""
+    return mock.patch.object(run, "_draw", return_value={})
+
+
+def quickly(settings: SamplerSettings) -> Any:
+    """While it lasts, runs take these settings, whatever they are given."""
+    infer = run.infer_contour
+    return mock.patch.object(
+        run, "infer_contour", lambda *given, **options: infer(*given, **options | {"settings": settings})
+    )
+
+
 def analysed_quickly(record: xr.Dataset, folder, **options) -> run.Run:
     """A run of few steps, without figures."""
-    with mock.patch.object(run, "_draw", return_value={}):
+    with undrawn():
         return run.analyse(record, folder, **({"rng": 1, "settings": FEW} | options))
 
 

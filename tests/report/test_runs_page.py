@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from helpers.refusals import refused
-from helpers.report_pages import FEW, Page, coarse_record
+from helpers.report_pages import FEW, Page, coarse_record, undrawn
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
 from tactile_bayes.report import write_report
 from tactile_bayes.rig import Rig
-from tactile_bayes.runs import contour, many
+from tactile_bayes.runs import many
 from tactile_bayes.uncertainty import overlay_distance, read_overlay
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.rod_reach import reach
@@ -28,8 +28,7 @@ def runs(tmp_path_factory):
     write_record(coarse_record(), records / "one.csv")
     write_record(coarse_record().isel(sample=slice(1, None)), records / "t<wo.csv")
     (records / "broken.csv").write_text("drive_angle,force_x\n1,2\n", encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contour, "_draw", lambda *_: {})
+    with undrawn():
         many.infer_contours(records, STATED, out=out, rng=3, settings=FEW, workers=1)
     return out
 

@@ -71,12 +71,6 @@ def test_the_summary_begins_with_the_messages(analysed):
     assert lines[-1] == run.posterior.attrs["message"]
 
 
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Runs without figures."""
-    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
-
-
 @pytest.mark.parametrize(
     ("error", "factor", "message"),
     [

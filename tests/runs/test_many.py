@@ -8,14 +8,13 @@ import pytest
 import xarray as xr
 
 from helpers.refusals import refused
-from helpers.report_pages import FEW, coarse_record
+from helpers.report_pages import FEW, analysed_quickly, coarse_record, undrawn
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.rig import Rig
-from tactile_bayes.runs import contour, many
-from tactile_bayes.runs.contour import analyse
+from tactile_bayes.runs import many
 
 STATED = Rig(unknown="nothing")
 OPTIONS = {"rng": 3, "settings": FEW, "workers": 1}
@@ -35,8 +34,7 @@ def records(tmp_path_factory):
 @pytest.fixture(scope="module")
 def made(records, tmp_path_factory):
     out = tmp_path_factory.mktemp("runs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contour, "_draw", lambda *_: {})
+    with undrawn():
         return many.infer_contours(records, STATED, out=out, **OPTIONS), out
 
 
@@ -59,9 +57,7 @@ def test_each_record_is_a_row_and_what_fails_has_its_reason(made):
 
 def test_a_run_is_that_of_the_record_alone(made, records, tmp_path):
     _, out = made
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contour, "_draw", lambda *_: {})
-        alone = analyse(many.read_record(records / "one.csv"), tmp_path, rig=STATED, rng=3, settings=FEW)
+    alone = analysed_quickly(many.read_record(records / "one.csv"), tmp_path, rig=STATED, rng=3)
     assert read_result(out / "one" / "posterior.nc")["posterior"].equals(alone.posterior["posterior"])
 
 

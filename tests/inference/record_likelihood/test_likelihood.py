@@ -172,7 +172,7 @@ def test_a_sensor_that_counts_has_the_accuracy_of_one_that_does_not():
 def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
     """First contact decides in which sense friction acts: here both occur, on a bent rod with a stem."""
     rod = Rod(rest_curvature=lambda s: -3.4 / (1.0 + np.exp(-(s - 0.55) / 0.08)), stem=0.03)
-    rng, count, senses = np.random.default_rng(5), 40, []
+    rng, count, senses = np.random.default_rng(5), 6, []
     bend, friction = rng.uniform(-0.1, 0.1, count), np.abs(rng.normal(0.2, 0.1, count))
     rig = RigValues(rest_curvature=bend, friction=friction, stem=rng.uniform(-0.02, 0.02, count))
     for drive in (Translation((0.11, 0.0), np.pi, 1.13, 1.1), Translation((0.3, -1.2), 2.05, 1.13, 1.1)):
@@ -180,7 +180,7 @@ def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
         measured = CELL.measure(scanned.record, rng=1)
         circles = Circle(*(0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])))
         loads, exact, likelihood, _ = by_table_and_exactly(measured, circles, rig)
-        assert len(loads) > 20
+        assert len(loads) > 3
         np.testing.assert_allclose(loads, exact, atol=2e-4 * np.abs(exact).max())
         angles = likelihood.paths(circles, rig).events[..., 0, STATE_COLUMNS.index("friction_angle")]
         senses += np.sign(angles[likelihood.usable(circles, rig)]).tolist()
