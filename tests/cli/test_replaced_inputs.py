@@ -15,7 +15,8 @@ from tactile_bayes.runs.contour import analyse
 
 TEXT = "the only copy of a day's work"
 
-# Names in braces are inputs that the output would replace; beside by.toml they are the shape of its rod.
+# Names in braces are inputs that the output would replace; beside by.toml they are the shape of its rod, and beside
+# like.toml the rig that it names.
 GAUGE = "--family circle --parameter r=0.01 --parameter q=0.05"
 
 CALLS = [
@@ -35,6 +36,7 @@ CALLS = [
     "measure {record.csv} --out record.csv --force-noise 1 --moment-noise 1",
     "scan --points {points.csv} --out points.csv",
     "scan --rig by.toml --out shape.csv {shape.csv}",
+    "scan --rig like.toml --out rig.csv {rig.csv}",
     "scan --carry {poses.csv} --out poses.csv",
     "scan --points {points.svg} --figure points.svg --out scan.csv",
     "calibrate --rig by.toml --out . {verdict.txt}",
@@ -77,11 +79,12 @@ def test_an_output_that_is_an_input_is_refused(words, tmp_path, monkeypatch):
         for folder in (Path(name).parent, Path("run")):
             folder.mkdir(exist_ok=True)
         Path(name).write_text(TEXT)
-    is_shape = "by.toml" in words
-    if is_shape:
+    is_named = "by.toml" in words or "like.toml" in words
+    if is_named:
         Path("by.toml").write_text(f'[rod]\nshape = "{name}"\n')
+        Path("like.toml").write_text(f'rig = "{name}"\n')
     before = contents(tmp_path)
-    result = commands.call(*(words[:start] + ("" if is_shape else name) + words[end + 1 :]).split())
+    result = commands.call(*(words[:start] + ("" if is_named else name) + words[end + 1 :]).split())
     commands.assert_refused(result, "would replace")
     assert contents(tmp_path) == before
     assert not [path for path in tmp_path.rglob("*") if path.suffix == ".tmp"]

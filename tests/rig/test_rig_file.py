@@ -202,6 +202,21 @@ def test_a_shape_is_found_beside_the_file(tmp_path, monkeypatch):
         read(folder / "rig.toml", SHAPED.replace("shape.csv", "other.csv"))
 
 
+def test_a_file_may_name_that_of_another_rig(tmp_path):
+    """It says only what is otherwise, and each of its tables replaces that of the other."""
+    other = tmp_path / "calibrated" / "rig.toml"
+    other.parent.mkdir()
+    RIGS["all"].write(other)
+    named = 'rig = "calibrated/rig.toml"\n'
+    rig = read(tmp_path / "rig.toml", named + "[file]\nforce_y = 'Fy[N]'\n[unknown]\nlever_y = '1 mm'\n")
+    assert (rig.rod, rig.load_cell, rig.calibration.source) == (RODS["SI, all"], CELLS["everything"], "0f 1e")
+    assert (rig.format.table, rig.entries) == ({"force_y": "Fy[N]"}, {"lever_y": 0.001})
+    assert read(tmp_path / "rig.toml", named).text == RIGS["all"].text
+    (tmp_path / "third.toml").write_text('rig = "rig.toml"\n')
+    with refused(ParameterError, "third.toml", "rig.toml", "calibrated/rig.toml"):
+        Rig.read(tmp_path / "third.toml")
+
+
 @pytest.mark.parametrize("key", ["rest_curvature = 1.0", "rest_curvature_deviation = 0.1", "taper_deviation = 0.01"])
 def test_what_follows_from_a_shape_is_not_stated_beside_it(tmp_path, key):
     write_shape(tmp_path, S, 0.2 * S**2)

@@ -23,17 +23,19 @@ Record = Annotated[Path, "Record, .csv or .nc, or a bag of ROS.", typer.Argument
 
 
 class _ReadsRig(Reads):
-    """Mark of the file of a rig, which may name another one, that of the rod's shape."""
+    """Mark of the file of a rig, which may name others: that of the rod's shape, and that of a calibrated rig."""
 
     def files(self, path: Path) -> Iterator[Path]:
-        """Yield both, if they are there."""
+        """Yield them, if they are there."""
         yield path
         from tactile_bayes.tasks.documents import read_toml
 
         with suppress(OSError, ValueError, TactileBayesError):  # whoever reads the file reports it
-            shape = read_toml(path.read_text(encoding="utf-8-sig")).get("rod", {})
-            if isinstance(shape, dict) and isinstance(shape.get("shape"), str):
-                yield path.parent / shape["shape"]
+            said = read_toml(path.read_text(encoding="utf-8-sig"))
+            rod = said.get("rod", {})
+            for name in (said.get("rig"), rod.get("shape") if isinstance(rod, dict) else None):
+                if isinstance(name, str):
+                    yield path.parent / name
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from tactile_bayes.mechanics.rods.rod import Rod, round_rigidity
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.spelling import look_alikes, refuse_unknown_keys
 from tactile_bayes.rig import Rig
-from tactile_bayes.rig.rig_file import ROD_UNITS, calibration_of, entries_of_cell, keys_of
+from tactile_bayes.rig.rig_file import ROD_UNITS, calibration_of, entries_of_cell, keys_of, refuse_twice
 from tactile_bayes.rig.rig_file import TABLES as OF_RIG
 from tactile_bayes.tasks.documents import LARGEST, read_toml
 
@@ -116,8 +116,7 @@ def _with_rig(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     rig = own.pop("rig", None)
     if rig is None:
         return own
-    if twice := [name for name in ("rod", "load_cell", "calibration") if name in own]:
-        raise SpecificationError(f"there are a rig and a table [{twice[0]}], which it states: leave one of the two")
+    refuse_twice(own)
     if not isinstance(rig, Rig):
         check_kind("rig", rig, str, "give the path of a rig.toml")
         rig = Rig.read(folder / rig)

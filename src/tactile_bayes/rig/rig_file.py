@@ -139,22 +139,43 @@ def tables_of(
 
 def stated_in(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return the arguments of `Rig` that tables state; see `Rig.of_tables`."""
-    refuse_unknown_keys(tables, TABLES, tables=TABLES)
-    for name, table in tables.items():
+    refuse_unknown_keys(tables, ("rig", *TABLES), tables=TABLES)
+    said = {name: table for name, table in tables.items() if name != "rig"}
+    for name, table in said.items():
         if name != "unknown" or table != "nothing":
             check_kind(name, table, Mapping, f"write it as a table, [{name}]")
             refuse_unknown_keys(table, keys_of(name, table), f"{name}.", TABLES)
-    said = tables.get("rod")
-    rod = None if said is None else _rod(said, folder)
-    is_si = rod is not None and not rod.is_dimensionless
-    calibration = tables.get("calibration")
-    return {
-        "rod": rod,
-        "load_cell": None if "load_cell" not in tables else _load_cell(tables["load_cell"], is_si),
-        "unknown": _unknown(tables.get("unknown", {}), is_si),
-        "calibration": None if calibration is None else calibration_of(calibration),
-        "file": tables.get("file", {}),
-    }
+    found: dict[str, Any] = {"rod": None, "load_cell": None, "unknown": {}, "calibration": None, "file": {}}
+    if "rig" in tables:
+        found = _of_other_rig(tables, folder)
+    if "rod" in said:
+        found["rod"] = _rod(said["rod"], folder)
+    is_si = found["rod"] is not None and not found["rod"].is_dimensionless
+    if "load_cell" in said:
+        found["load_cell"] = _load_cell(said["load_cell"], is_si)
+    if "unknown" in said:
+        found["unknown"] = _unknown(said["unknown"], is_si)
+    if "calibration" in said:
+        found["calibration"] = calibration_of(said["calibration"])
+    return found | ({"file": said["file"]} if "file" in said else {})
+
+
+def _of_other_rig(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the arguments of `Rig` that the file states which tables name."""
+    check_kind("rig", tables["rig"], str, "give the path of a rig.toml")
+    refuse_twice(tables)
+    path = folder / tables["rig"]
+    with named_in_errors(path):
+        others = read_tables(path)
+        if "rig" in others:
+            raise ParameterError(f"it names a rig itself, {shown(others['rig'])}: name that one")
+        return stated_in(others, path.parent)
+
+
+def refuse_twice(tables: Mapping[str, Any]) -> None:
+    """Refuse tables beside a rig which it states."""
+    if twice := [name for name in ("rod", "load_cell", "calibration") if name in tables]:
+        raise ParameterError(f"there are a rig and a table [{twice[0]}], which it states: leave one of the two")
 
 
 def _rod(said: Mapping[str, Any], folder: Path) -> Rod:

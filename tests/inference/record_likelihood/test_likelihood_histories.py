@@ -68,6 +68,24 @@ def test_a_drive_that_begins_in_contact_was_turned_in(friction, exact):
     np.testing.assert_allclose(loads[0], known, atol=1e-7 if exact else 1e-4)
 
 
+@pytest.mark.parametrize("angle", [1.7, 1.3714, 1.36])
+def test_what_sticks_as_it_is_turned_in_has_the_loads_of_a_path_that_is_followed(angle):
+    """It sticks for 4e-3 rad, from 1.3694 on: long before the record begins, where it begins, and later."""
+    x = np.linspace(0.0, -0.3, 20)
+    columns = {"sweep": 0, "direction": "forward", "base_x": x, "drive_angle": np.full(20, angle)}
+    rod = tb.Rod(rest_curvature=lambda s: 0.5 - 4.0 * s**4)
+    record = tb.make_record(columns | dict.fromkeys(CHANNELS, 0.1 + 0.0 * x), Rig(rod=rod))
+    contour = tb.contours.Circle(np.array([0.02]), np.array([0.5]), np.array([0.1]))
+    cell = tb.LoadCell(force_noise=5e-4, moment_noise=2e-4)
+    (exact, _), (fast, reached) = (
+        RecordLikelihood(record, cell, 0.4, exact=mode).predict(contour, RigValues(friction=0.4))
+        for mode in (True, False)
+    )
+    assert reached.all()
+    assert np.all(exact[0, :, 0] > 0.1)
+    np.testing.assert_allclose(fast, exact, atol=1e-6)
+
+
 def test_an_encoder_offset_is_that_of_the_clamp():
     """A rod that is clamped otherwise than its reading says gives the loads of a drive at that angle."""
     offset = 0.02

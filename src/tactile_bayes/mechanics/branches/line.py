@@ -169,6 +169,14 @@ def pose_at(line: Line, travel: float) -> Offset:
 
 
 @compiled
+def is_before_record(line: Line | None, travel: float) -> bool:
+    """True for a travel on the line that turns a rod in."""
+    if line is None:
+        return False
+    return line.end <= 0.0 and travel < line.end
+
+
+@compiled
 def only_turns(line: Line | None) -> bool:
     """True if the base rests."""
     if line is None:

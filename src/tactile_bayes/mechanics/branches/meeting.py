@@ -36,7 +36,7 @@ from tactile_bayes.mechanics.branches.leg import (
     share_of,
     shortened,
 )
-from tactile_bayes.mechanics.branches.line import Line
+from tactile_bayes.mechanics.branches.line import Line, is_before_record
 from tactile_bayes.mechanics.branches.phase import (
     ROLLING,
     contact_at,
@@ -169,10 +169,14 @@ def go_on(here: Here, setting: Setting, step: LegStep, met: Meeting, event: Any,
     there = _behind(here, setting, step, met)
     if event.snap_off > _NEVER:
         return there
-    if met.kind == _MODE and slides(here.scene.phase) and there.begin.at.force < _FAINT:
-        back = slid_back(there)
-        if math.isfinite(back.begin.at.p):
-            return back
+    if met.kind == _MODE and slides(here.scene.phase):
+        # Before the record begins, loads are not asked for, and those of a contact that slides have no history.
+        now, passes = there.begin, not work.accuracy.exact
+        if now.at.force < _FAINT or (passes and is_before_record(there.scene.line, now.travel)):
+            back = slid_back(there)
+            passes = passes and is_before_record(there.scene.line, 2.0 * back.begin.travel - now.travel)
+            if math.isfinite(back.begin.at.p) and (now.at.force < _FAINT or passes):
+                return back
     is_held, there = in_mode(there, met.kind == _MODE)
     if not is_held and not slides(here.scene.phase):
         there = slid_back(here)
