@@ -9,80 +9,26 @@ import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import BRIEF, infer_as_stated, only, swept
-from tactile_bayes.contours import Circle
+from helpers.known_numbers import scaled
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Gauge
 from tactile_bayes.inference.stored_experiment import found_rig
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.report.frames import motion_of
 from tactile_bayes.rig import Rig
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 
-MODES = [
-    lambda s: 3.0 - 30.0 * s,
-    lambda s: 20.0 * s,
-    *(lambda s, k=k: np.cos(30.0 * k * s) for k in (2, 3, 4)),
-]
-ROD = Rod(0.1, 2e-4, rest_curvature=2.0, taper=0.2, stem=0.004, rest_shape_modes=MODES, taper_deviation=0.04)
-CELL = LoadCell(
-    force_noise=0.05 * ROD.force_unit,
-    moment_noise=0.02 * ROD.moment_unit,
-    gain=((1.02, 0.0, 0.0003), (0.0, 0.97, 0.01), (0.0, 0.0, 1.0)),
-    lever=(0.001, 0.002),
-    moment_curve=(0.02 / ROD.moment_unit, 0.001 / ROD.moment_unit**2),
-    drive_angle_offset=0.01,
-    drive_angle_backlash=0.01,
-)
-PIN = Circle(0.02, 0.05, 0.002)
-MOMENT, FORCE = ROD.moment_unit, ROD.force_unit
-KNOWN = {
-    "rigidity_scale": 1.04,
-    "drive_angle_offset": 0.015,
-    "moment_bias": 0.05 * MOMENT,
-    "force_x_bias": -0.04 * FORCE,
-    "force_y_bias": 0.03 * FORCE,
-    "lever_x": 0.0005,
-    "lever_y": -0.0007,
-    "backlash": 0.02,
-    "friction": 0.15,
-    "moment_drift": 0.1 * MOMENT,
-    "force_x_drift": 0.07 * FORCE,
-    "force_y_drift": -0.08 * FORCE,
-    "moment_gain": 1.03,
-    "force_x_gain": 0.96,
-    "force_y_gain": 1.05,
-    "moment_curve_quadratic": -0.01 / MOMENT,
-    "moment_curve_cubic": 0.004 / MOMENT**2,
-    "lag": 1.3,
-    "play": 0.02,
-    "suspension_compliance": 0.03 / MOMENT,
-    "contact_compliance": 0.001 / FORCE,
-    "rest_curvature": 1.1,
-    "rest_shape_1": 0.7,
-    "rest_shape_2": -0.4,
-    "rest_shape_3": 1.2,
-    "rest_shape_4": 0.5,
-    "rest_shape_5": -0.8,
-    "taper": 0.25,
-    "taper_error": 0.9,
-    "stem": 0.0055,
-    "length": 0.102,
-    "gauge_x": 0.0006,
-    "gauge_y": -0.0008,
-    "noise_scale": 1.7,
-    "base_2_x": 0.0009,
-    "base_2_y": -0.0004,
-}
+ROD, SENSOR, PIN, BASES, KNOWN = scaled(0.1, 2e-4)
+NOISES = {"force_noise": 0.05 * ROD.force_unit, "moment_noise": 0.02 * ROD.moment_unit}
+CELL = replace(SENSOR, **NOISES, drive_angle_offset=0.01, drive_angle_backlash=0.01)
 # Parameters of which numbers are refused, with what is to be said in their place.
 NEVER_KNOWN = {*GROUPS["discrepancy"], "moment_noise", "force_noise"}
 
 
 @cache
 def record() -> xr.Dataset:
-    return CELL.measure(swept(PIN, bases=((0.0, 0.0), (0.01, 0.003)), rod=ROD, step=0.1), rng=1)
+    return CELL.measure(swept(PIN, bases=BASES, rod=ROD, step=0.1), rng=1)
 
 
 FEW = replace(BRIEF, max_steps=2, block_steps=2)
@@ -137,7 +83,7 @@ def test_some_known_and_others_inferred_are_as_all_inferred(seed):
         {"relative_noise": 0.02},
         {"drive_angle_noise": 0.005},
         {"force_resolution": 0.002},
-        {"bias_uncertainty": (0.0, 0.01 * FORCE, 0.0)},
+        {"bias_uncertainty": (0.0, 0.01 * ROD.force_unit, 0.0)},
     ],
     ids=lambda flaw: next(iter(flaw)),
 )
