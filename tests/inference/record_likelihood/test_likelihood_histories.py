@@ -11,7 +11,7 @@ from helpers.contour_posteriors import CELL
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.record import loads_of
+from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.rig import Rig
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
