@@ -18,6 +18,7 @@ from tactile_bayes.contours import (
     Parabola,
     PowerLaw,
     ShapeFree,
+    Smooth,
     from_function,
     paper_profile,
 )
@@ -225,6 +226,7 @@ MAKERS = {
     "ellipse": lambda a, b, n, q, x_c: Ellipse(a, b, q, x_c),
     "power-law": lambda a, b, n, q, x_c: PowerLaw(a, n, q, x_c),
     "shape-free": shape_free,
+    "flat-sided": lambda a, b, n, q, x_c: Smooth(np.multiply.outer(np.log(a), np.ones(4)), q, x_c, b, 0.5),
     "vertex": lambda a, b, n, q, x_c: Joined(Ellipse(a, b, q, x_c), PowerLaw(b, n, q, x_c)),
     "edge": lambda a, b, n, q, x_c: Joined(Parabola(a, q, x_c + 0.3), Parabola(a, q, x_c - 0.3), x=x_c),
 }

@@ -14,7 +14,7 @@ OWN = {"parabola": (0.8,), "circle": (0.7,), "ellipse": (0.9, 0.6), "power-law":
 CASES = {
     name: (*(v for flank in name.split("/") for v in OWN[flank]), 0.3, -0.2)
     for name in FAMILIES
-    if name != "shape-free"
+    if name not in ("shape-free", "flat-sided")
 }
 
 

@@ -29,6 +29,16 @@ def test_points_are_integrals_of_the_radius(alpha):
     assert contour.radius_of_curvature(alpha) == pytest.approx(np.exp(wavy(alpha)), rel=1e-8)
 
 
+def test_a_flat_side_is_an_edge_of_its_length():
+    """Its slope angles are normal, with a standard deviation of 0.01, so that its chord is shorter by 5e-5."""
+    log_radius = wavy(Smooth.nodes(NODES))
+    bare, sided = Smooth(log_radius, q=0.3), Smooth(log_radius, q=0.3, flat_length=0.4, flat_slope=0.6)
+    further = np.array(sided.point([-0.5, 0.5, 0.7, 1.2])) - bare.point([-0.5, 0.5, 0.7, 1.2])
+    chord = 0.4 * np.exp(-0.5 * 0.01**2) * np.array([np.cos(0.6), np.sin(0.6)])
+    np.testing.assert_allclose(further, np.outer(chord, [0.0, 0.0, 1.0, 1.0]), rtol=0.0, atol=1e-6)
+    check(sided)
+
+
 def test_it_keeps_the_rules_of_a_contour():
     check(Smooth(wavy(Smooth.nodes(NODES)), q=0.3, x_c=0.1))
     check(Smooth(np.stack([wavy(Smooth.nodes(NODES)), np.zeros(NODES)]), q=0.3, x_c=[0.0, 0.2]))

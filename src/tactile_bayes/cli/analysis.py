@@ -40,8 +40,8 @@ def infer(
     out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, WATCH_PAGE, *MANY))],
     family: Annotated[
         str,
-        "Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, any "
-        "smooth one.",
+        "Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; shape-free, any "
+        "smooth one; or flat-sided, one with a flat side.",
     ] = "parabola",
     rig: RigOptions,
     probability: Annotated[float, "Probability of band and intervals.", typer.Option(min=0.0, max=1.0)] = 0.95,

@@ -24,7 +24,7 @@ from tactile_bayes.contours.joined import Joined
 from tactile_bayes.contours.oval import Circle, Ellipse
 from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.power_law import PowerLaw
-from tactile_bayes.contours.shape_free_family import SHAPE_FREE
+from tactile_bayes.contours.shape_free_family import FLAT_SIDED, SHAPE_FREE
 from tactile_bayes.errors import ParameterError
 
 _FAR = 1e3  # widths from the vertex beyond which the height of a power law is constant, to avoid overflow
@@ -163,6 +163,7 @@ def _of_flanks(name: str) -> FlankFamily:
 FAMILIES: dict[str, ContourFamily] = {
     **{name: _of_flanks(name) for name in FLANKS},
     SHAPE_FREE.name: SHAPE_FREE,
+    FLAT_SIDED.name: FLAT_SIDED,
     **{f"{left}/{right}": _of_flanks(f"{left}/{right}") for left in FLANKS for right in FLANKS},
 }
 
@@ -172,6 +173,6 @@ def family_named(name: str) -> ContourFamily:
     if not isinstance(name, str) or name not in FAMILIES:
         raise ParameterError(
             f"there is no family {shown(name)}: choose {', '.join(FLANKS)}, one for each flank, like "
-            "parabola/power-law, or shape-free"
+            "parabola/power-law, shape-free or flat-sided"
         )
     return FAMILIES[name]

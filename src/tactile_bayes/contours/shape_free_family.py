@@ -28,6 +28,14 @@ from tactile_bayes.numerics.selection import evenly_spread
 
 # Priors of the standard deviation of log ρ, and of the length over which it changes [rad].
 _AMPLITUDE, _LENGTH = log_normal(0.6, 0.7), log_normal(0.4, 0.7)
+_FLAT_LENGTH = log_normal(0.7, 0.5)
+_UPRIGHT = 0.5 * np.pi
+_FLAT = {
+    "flat_length": FamilyParameter("length of the flat side", 1, _FLAT_LENGTH, (0.0, np.inf)),
+    "flat_slope": FamilyParameter(
+        "slope angle of the flat side", 0, DefaultPrior("norm", {"scale": 1.0}), (-_UPRIGHT, _UPRIGHT), "rad"
+    ),
+}
 # First guess of the scatter of points to be fitted [L], and the threshold of the soft-L1 loss in units of it.
 _SCATTER, _HUBER = 0.01, 2.0
 _STEP = 1e-5
@@ -41,6 +49,7 @@ class ShapeFreeFamily(ContourFamily):
 
     name: str
     radius: RandomRadius  # prior of the radius of curvature
+    has_flat: bool = False  # whether one of its sides is flat
 
     @cached_property
     def table(self) -> dict[str, FamilyParameter]:  # type: ignore[override]
@@ -52,6 +61,7 @@ class ShapeFreeFamily(ContourFamily):
             "amplitude": FamilyParameter(spread, 0, _AMPLITUDE, (0.0, np.inf)),
             "length_scale": FamilyParameter("slope angle over which it changes", 0, _LENGTH, lengths, "rad"),
             **dict.fromkeys(self.directions, weight),
+            **(_FLAT if self.has_flat else {}),
             **VERTEX,
         }
 
@@ -65,9 +75,17 @@ class ShapeFreeFamily(ContourFamily):
         return ("amplitude", "length_scale", *self.directions)
 
     def build(self, *values: Any) -> Contour:
-        r, amplitude, length, *weights, q, x_c = np.broadcast_arrays(*map(np.asarray, values))
-        log_radius = self.radius.log_radius(np.log(r), amplitude, length, np.stack(weights, axis=-1))
-        return Smooth(log_radius, q=q, x_c=x_c)
+        r, amplitude, length, *rest = np.broadcast_arrays(*map(np.asarray, values))
+        weights, placed = np.stack(rest[: self.radius.count], axis=-1), rest[self.radius.count :]
+        if self.has_flat:
+            placed[0] = np.log(placed[0])
+        return self.smooth(self.radius.log_radius(np.log(r), amplitude, length, weights), *placed)
+
+    def smooth(self, log_radius: Floats, *placed: Floats) -> Smooth:
+        """Return contours from log-radii at the nodes, (n, nodes), the logarithm of the length of the flat side and its
+        slope angle, if there is one, and the vertex, (n,)."""
+        *flat, q, x_c = placed
+        return Smooth(log_radius, q, x_c, *([np.exp(flat[0]), flat[1]] if flat else []))
 
     def contour(self, values: Mapping[str, Any]) -> Contour:
         r, amplitude, length = (np.asarray(values[name]) for name in ("r", "amplitude", "length_scale"))
@@ -87,14 +105,18 @@ class ShapeFreeFamily(ContourFamily):
         picked = evenly_spread(x.size, _POINTS)
         x, y = x[picked], y[picked]
         a, q, x_c = parabola_through(x, y)
-        middle = np.array([np.log(0.5 / a), *np.zeros(self.radius.count), q, x_c])
+        slopes = np.arctan(2.0 * a * (np.array([x.min(), x.max()]) - x_c))
+        flat = [np.log(_FLAT_LENGTH.numbers["scale"]), slopes[np.argmax(np.abs(slopes))]] if self.has_flat else []
+        middle = np.array([np.log(0.5 / a), *np.zeros(self.radius.count), *flat, q, x_c])
         amplitude = float(np.exp(_AMPLITUDE.numbers["s"] * ndtri(0.9)) * _AMPLITUDE.numbers["scale"])  # the last decile
         length = _LENGTH.numbers["scale"]
 
         def residuals(points: Floats, scatter: float) -> Floats:
             """Residuals at parameters of shape (n, d), shape (n, points + d)."""
             ones = np.ones(len(points))
-            contours = self.build(np.exp(points[:, 0]), amplitude * ones, length * ones, *points[:, 1:].T)
+            columns = np.split(points, [1, 1 + self.radius.count], axis=1)
+            log_radius = self.radius.log_radius(columns[0][:, 0], amplitude * ones, length * ones, columns[1])
+            contours = self.smooth(log_radius, *columns[2].T)
             return np.hstack([_distances(contours, x, y) / scatter, points - middle])
 
         def of_one(point: Floats, scatter: float) -> Floats:
@@ -110,9 +132,9 @@ class ShapeFreeFamily(ContourFamily):
             point = found.x
             left = residuals(point[None], 1.0)[0, : x.size]
             scatter = max(robust_deviation(left), 0.1 * _SCATTER)
-        weights = dict(zip(self.directions, point[1:-2].tolist(), strict=True))
-        sizes = {"r": float(np.exp(point[0])), "amplitude": amplitude, "length_scale": length}
-        return {**sizes, **weights, "q": float(point[-2]), "x_c": float(point[-1])}
+        others = [name for name in self.parameters if name not in ("amplitude", "length_scale")]
+        values = dict(zip(others, point.tolist(), strict=True)) | {"amplitude": amplitude, "length_scale": length}
+        return {name: float(np.exp(v)) if name in ("r", "flat_length") else v for name, v in values.items()}
 
 
 def _distances(contours: Contour, x: Floats, y: Floats) -> Floats:
@@ -124,3 +146,4 @@ def _distances(contours: Contour, x: Floats, y: Floats) -> Floats:
 
 
 SHAPE_FREE = ShapeFreeFamily("shape-free", RandomRadius(shortest=0.15, longest=4.0, tolerance=0.01))
+FLAT_SIDED = ShapeFreeFamily("flat-sided", SHAPE_FREE.radius, has_flat=True)

@@ -21,8 +21,10 @@ from tactile_bayes.numerics.roots import falling_root
 _UPRIGHT = 0.5 * np.pi
 _LARGEST = 100.0  # bound on the logarithm of a radius
 _MOST_NODES = 10_000  # largest number of nodes that is given
-# Cells of a contour, on each of which it is a polynomial of fifth degree; even, so that the vertex ends a cell.
-_CELLS = 128
+# Cells of a contour, on each of which it is a polynomial of fifth degree, without and with a flat; even, so that the
+# vertex ends a cell.
+_CELLS, _CELLS_OF_FLAT = 128, 512
+_FLAT_WIDTH = 0.01  # standard deviation of the slope angles of a flat [rad], whose middle rises by 0.3 % of its length
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,8 @@ class Smooth(Tabled):
         `Smooth.nodes(k)`; k ≥ 2.
     q, x_c : array_like, shape (...)
         Height and position of the vertex [length].
+    flat_length, flat_slope : array_like, shape (...)
+        Length [length] and slope angle [rad] of a flat side, over which the contour turns by 0.02 rad; none by default.
 
     Raises
     ------
@@ -54,19 +58,22 @@ class Smooth(Tabled):
     (np.float64(0.841470984808), np.float64(0.841470984808))
     """
 
-    _by_contour: ClassVar = ("log_radius", "q", "x_c", "_row")
+    _by_contour: ClassVar = ("log_radius", "q", "x_c", "flat_length", "flat_slope", "_row")
 
     log_radius: Floats
     q: Parameter
     x_c: Parameter = 0.0
+    flat_length: Parameter = 0.0
+    flat_slope: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        self._take_arrays("log_radius", "q", "x_c")
+        self._take_arrays(*self._by_contour[:-1])
         values = self.log_radius
         if values.ndim < 1 or values.shape[-1] < 2:
             raise ContourError(f"Smooth: log_radius of shape {values.shape} has not at least 2 values for a contour")
         self._share_shape()
-        self.__dict__["_table"] = _tabulated(chebyshev.coefficients(self.log_radius.reshape(-1, values.shape[-1])))
+        of_radius = chebyshev.coefficients(self.log_radius.reshape(-1, values.shape[-1]))
+        self.__dict__["_table"] = _tabulated(of_radius, np.ravel(self.flat_length), np.ravel(self.flat_slope))
 
     @staticmethod
     def nodes(count: int) -> Floats:
@@ -90,11 +97,12 @@ class Smooth(Tabled):
     @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha, row = np.broadcast_arrays(self._at("parameter", parameter), self.__dict__["_row"])
-        way = (alpha + _UPRIGHT) * (_CELLS / (2.0 * _UPRIGHT))
-        cell = np.nan_to_num(np.clip(way, 0, _CELLS - 1)).astype(np.intp)
         table = self.__dict__["_table"]
+        cells = table.shape[1] - 1
+        way = (alpha + _UPRIGHT) * (cells / (2.0 * _UPRIGHT))
+        cell = np.nan_to_num(np.clip(way, 0, cells - 1)).astype(np.intp)
         x, y, x_rate, y_rate = _between(table[row, cell], table[row, cell + 1], way - cell)
-        speed = (x_rate * np.cos(alpha) + y_rate * np.sin(alpha)) * (_CELLS / (2.0 * _UPRIGHT))
+        speed = (x_rate * np.cos(alpha) + y_rate * np.sin(alpha)) * (cells / (2.0 * _UPRIGHT))
         return Locus(self.x_c + x, self.q + y, alpha, speed, np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
@@ -106,13 +114,14 @@ class Smooth(Tabled):
         row = np.broadcast_to(self.__dict__["_row"], shape).ravel()
         goal = (np.broadcast_to(x, shape) - np.broadcast_to(self.x_c, shape)).ravel()
         table = self.__dict__["_table"]
-        first, last = np.zeros(row.size, dtype=np.intp), np.full(row.size, _CELLS)
-        for _ in range(_CELLS.bit_length()):
+        cells = table.shape[1] - 1
+        first, last = np.zeros(row.size, dtype=np.intp), np.full(row.size, cells)
+        for _ in range(cells.bit_length()):
             middle = (first + last) // 2
             beyond = table[row, middle, 0] > goal
             first, last = np.where(beyond, first, middle), np.where(beyond, middle, last)
         there = np.flatnonzero((table[row, 0, 0] <= goal) & (goal <= table[row, -1, 0]))
-        row, first, goal = row[there], np.minimum(first[there], _CELLS - 1), goal[there]
+        row, first, goal = row[there], np.minimum(first[there], cells - 1), goal[there]
         left, right = table[row, first], table[row, first + 1]
 
         def short_of(i: Index, t: Floats) -> tuple[Floats, Floats]:
@@ -121,26 +130,32 @@ class Smooth(Tabled):
 
         found = np.full(beyond.shape, np.nan)
         way = first + falling_root(short_of, np.zeros(there.size), np.ones(there.size))
-        found[there] = way * (2.0 * _UPRIGHT / _CELLS) - _UPRIGHT
+        found[there] = way * (2.0 * _UPRIGHT / cells) - _UPRIGHT
         return found.reshape(shape)
 
 
-def _tabulated(coefficients: Floats) -> Floats:
+def _tabulated(coefficients: Floats, flat_length: Floats, flat_slope: Floats) -> Floats:
     """Table at the ends of cells, (n, cells + 1, 6), as in `Halves`, from coefficients of log ρ, (k, n).
 
     The integral over a cell has an error of seventh order in its width.
     """
-    alpha, values, slopes = _grid(coefficients.shape[0])
+    cells = _CELLS_OF_FLAT if np.any(flat_length) else _CELLS
+    alpha, values, slopes = _grid(coefficients.shape[0], cells)
     log_radius = coefficients.T @ values
     if np.abs(log_radius).max(initial=0.0) > _LARGEST:
         raise ContourError(
             f"Smooth: log_radius reaches {np.abs(log_radius).max():.3g}: give values that belong to a smooth "
             "curve, or fewer"
         )
-    width = 2.0 * _UPRIGHT / _CELLS
+    width = 2.0 * _UPRIGHT / cells
     radius = width * np.exp(log_radius)
     change = radius[:, ::2] * (coefficients.T @ slopes) * width
-    table = np.empty((len(radius), _CELLS + 1, 6))
+    if np.any(flat_length):
+        away = (alpha - flat_slope[:, None]) / _FLAT_WIDTH
+        flat = flat_length[:, None] * np.exp(-0.5 * away**2) * (width / (_FLAT_WIDTH * np.sqrt(2.0 * np.pi)))
+        radius += flat
+        change -= (flat * away)[:, ::2] * (width / _FLAT_WIDTH)
+    table = np.empty((len(radius), cells + 1, 6))
     for axis, (along, turn) in enumerate(((np.cos(alpha), -np.sin(alpha)), (np.sin(alpha), np.cos(alpha)))):
         rate = radius * along
         bend = change * along[::2] + width * radius[:, ::2] * turn[::2]
@@ -148,15 +163,15 @@ def _tabulated(coefficients: Floats) -> Floats:
         steps = (7.0 * (ends[:, :-1] + ends[:, 1:]) + 16.0 * middles) / 30.0 + (bend[:, :-1] - bend[:, 1:]) / 60.0
         table[:, 0, axis] = 0.0
         np.cumsum(steps, axis=1, out=table[:, 1:, axis])
-        table[..., axis] -= table[:, [_CELLS // 2], axis]
+        table[..., axis] -= table[:, [cells // 2], axis]
         table[..., 2 + axis], table[..., 4 + axis] = ends, bend
     return table
 
 
 @functools.cache
-def _grid(count: int) -> tuple[Floats, Floats, Floats]:
+def _grid(count: int, cells: int) -> tuple[Floats, Floats, Floats]:
     """Slope angles at ends and middles of cells, Chebyshev polynomials there, and their derivatives at the ends."""
-    z = np.linspace(0.0, 1.0, 2 * _CELLS + 1)
+    z = np.linspace(0.0, 1.0, 2 * cells + 1)
     slopes = chebyshev.evaluate(chebyshev.derivative(np.eye(count)), z[::2, None]).T
     return 2.0 * _UPRIGHT * (z - 0.5), chebyshev.basis(count, z), slopes / (2.0 * _UPRIGHT)
 

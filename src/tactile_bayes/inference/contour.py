@@ -62,8 +62,9 @@ def infer_contour(
         A record; SI or dimensionless, channels may be missing.
     family : str or Family
         Family of the contour by name: parabola, circle, ellipse, power-law, or one for each flank, like
-        "parabola/power-law", on the left and on the right of a common vertex; or "shape-free", any smooth contour. As a
-        `Family`, what is said of its parameters, in the record's units: a number is known, a distribution its prior.
+        "parabola/power-law", on the left and on the right of a common vertex; "shape-free", any smooth contour; or
+        "flat-sided", one with a flat side. As a `Family`, what is said of its parameters, in the record's units: a
+        number is known, a distribution its prior.
     rig : Rig, optional
         Rod, load cell, and the unknowns of the rig, which are inferred beside the contour; by default those that the
         record states, with the unknowns of a real rig.
@@ -112,10 +113,11 @@ def infer_contour(
     (y − q)/w = (|x − x_c|/w)ⁿ, around L. Its n − 1 is log-normal around 1 (0.7), n from 1.1 to 50. Shape-free contours
     are smooth: the logarithm of their radius of curvature is a random function of the slope angle (Matérn, ν = 5/2). r,
     its geometric mean, is log-normal like a circle's; amplitude, its standard deviation, around 0.7 (0.6); length_scale
-    [rad] around 0.7 (0.4), from 0.15 to 4; z_1, z_2 …, its directions, are standard normal. noise_scale is log-normal
-    around 1 (0.5); unknown noises are log-uniform from 1e-6 to 10, in EI/L and EI/L². Those of the rig are in the table
-    of `tactile-bayes rig --parameters`. In addition, contours are excluded that the rod would still cut after snap-off,
-    or that a rod curved toward the object would touch twice.
+    [rad] around 0.7 (0.4), from 0.15 to 4; z_1, z_2 …, its directions, are standard normal. flat_length of a flat side
+    is log-normal around L/2 (0.7), flat_slope normal (1 rad). noise_scale is log-normal around 1 (0.5); unknown noises
+    are log-uniform from 1e-6 to 10, in EI/L and EI/L². Those of the rig are in the table of `tactile-bayes rig
+    --parameters`. In addition, contours are excluded that the rod would still cut after snap-off, or that a rod curved
+    toward the object would touch twice.
 
     A discrepancy is a Gaussian process over the drive, ν = 3/2, of each channel and sweep segment, in proportion to the
     largest load and zero out of contact. It is refused beside outliers, correlated noise, errors of the encoder, and

@@ -11,6 +11,7 @@ FORMULAS = {
     "ellipse": "an ellipse of semi-axes a (sideways) and b, lowest at (x_c, q)",
     "power-law": "(y − q)/w = (|x − x_c|/w)ⁿ",
     "shape-free": "any smooth contour: log radius of curvature is a random function of the slope angle",
+    "flat-sided": "any smooth contour with one flat side, shape-free elsewhere",
 }
 
 

@@ -13,7 +13,7 @@ from scipy.special import log_ndtr, ndtri_exp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
-from tactile_bayes.inference.shape_free_posterior.columns import joined, white_scales
+from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, white_scales
 from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, Observer, linearised
 
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
@@ -68,7 +68,8 @@ class NormalApproximation:
         self.white = white_scales(observer.model)
         self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None])[0])
         known, self._count = family.radius.directions, family.radius.count
-        self._vertex = slice(1 + self._count, 3 + self._count)
+        vertex = linear_names(observer.model).index("q")
+        self._vertex = slice(vertex, vertex + 2)
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         self._radius = family.radius
         log_radius = self._log_radius(scales[None], linear[None])[0]
@@ -113,7 +114,7 @@ class NormalApproximation:
         (through,), (certainty,) = self._information(scales[None])
         each = np.eye(self.prior.mean.size)
         radii = self._log_radius(np.tile(scales, (len(each), 1)), each).T
-        units = np.append(np.ones(len(radii)), np.sqrt(self.prior.precision[1 + self._count :]))
+        units = np.append(np.ones(len(radii)), 1.0 / self.prior.deviation[1 + self._count :])
         rows = np.vstack([through, radii, each[1 + self._count :] * units[len(radii) :, None]])
         observed = certainty * (self.observations.slopes @ self._centre)
         return np.asarray(np.linalg.lstsq(rows, np.append(observed, units * self._centre))[0])
@@ -129,9 +130,9 @@ class NormalApproximation:
         Orthogonal transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15.
         """
         through, certainty = self._information(scales)
-        size, root = self.prior.mean.size, np.sqrt(self.prior.precision)
+        size, root = self.prior.mean.size, self.prior.root
         rows = np.zeros((len(scales), size + through.shape[1], size + 1))
-        rows[:, :size] = np.column_stack([np.diag(root), root * self.prior.mean])
+        rows[:, :size] = np.column_stack([root, root @ self.prior.mean])
         rows[:, size:, :size], rows[:, size:, size] = through, certainty * self.observations.values
         upper = np.asarray(np.linalg.qr(rows, mode="r"))
         return upper * np.copysign(1.0, np.diagonal(upper, axis1=1, axis2=2))[..., None]
@@ -151,13 +152,13 @@ class NormalApproximation:
         Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value.
         """
         (through,), (certainty,) = self._information(scales[None])
-        root = np.sqrt(self.prior.precision)
-        _, sizes, axes = np.linalg.svd(slopes := through / root)
+        root = self.prior.root
+        _, sizes, axes = np.linalg.svd(slopes := np.linalg.solve(root.T, through.T).T)
         pull = axes @ (
-            slopes.T @ (certainty * self.observations.values - through @ start) + root * (self.prior.mean - start)
+            slopes.T @ (certainty * self.observations.values - through @ start) + root @ (self.prior.mean - start)
         )
         precision = 1.0 + damping[:, None] + np.pad(sizes**2, (0, start.size - sizes.size))
-        there = start + (pull / precision) @ axes / root
+        there = start + np.linalg.solve(root, ((pull / precision) @ axes).T).T
         vanishing = slice(start.size - self.vanishing, None)
         there[:, vanishing] = np.maximum(there[:, vanishing], 0.5 * start[vanishing])
         return np.asarray(there)

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.special import huber
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.contours import Contour, Smooth
+from tactile_bayes.contours import Contour
+from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.shape_free_posterior.columns import linear_names, white_scales
 from tactile_bayes.numerics.scatter import robust_deviation
@@ -73,10 +74,11 @@ class Observer:
 
 
 class LinearPrior(NamedTuple):
-    """Means and precisions, shape (d,) each, of log r, the directions' weights, the vertex and the rig."""
+    """Normal prior of log r, the directions' weights, the flat side if there is one, the vertex and the rig."""
 
-    mean: Floats
-    precision: Floats
+    mean: Floats  # shape (d,)
+    deviation: Floats  # shape (d,)
+    root: Floats  # root of the precision rootᵀ·root, which holds the correlations of a calibrated rig, shape (d, d)
 
 
 class Observations(NamedTuple):
@@ -96,17 +98,19 @@ def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: F
     better ones.
     """
     model = observer.model
-    rig = linear_names(model)[prior.mean.size - len(model.unknowns.names) :]
-    nodes = centre.size - 2 - len(rig)
-    units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
+    family = model.family
+    assert isinstance(family, ShapeFreeFamily)
+    nodes, rig = family.radius.nodes, linear_names(model)[prior.mean.size - len(model.unknowns.names) :]
+    first_of_rig = centre.size - len(rig)
+    units = np.append(np.ones(nodes), prior.deviation[nodes - centre.size :])
     noises = scales[white_scales(model)]
 
     def differences(axes: Floats, steps: Floats) -> tuple[list[_Lines], list[float]]:
         """Return the lines along axes, for each kind of noise and for snap-offs, and the scatter of each kind."""
         moves = steps[:, None] * axes * units
         points = np.concatenate([centre + moves, centre - moves, centre[None]])
-        contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
-        residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
+        contours = family.smooth(points[:, :nodes], *points[:, nodes:first_of_rig].T)
+        residual, agree, late = observer(contours, dict(zip(rig, points[:, first_of_rig:].T, strict=True)))
         # A sample that is loaded on one side of a difference only has no slope.
         smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
         lines, scatter = [], []

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, scale_names, split
+from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, logarithms, scale_names, split
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
 from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, Observer
 
@@ -88,12 +89,13 @@ class Whitening(Coordinates):
         numbers = self.mean + coordinates[:, bent:] @ self.root.T
         normal, growth = self.approximation.truncated(pulled, root, numbers)
         linear = np.asarray(np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + normal)[..., None])[..., 0])
-        linear[:, 0] = np.clip(linear[:, 0], -_LARGEST, _LARGEST)
+        of_lengths = logarithms(self.approximation.model)
+        linear[:, of_lengths] = np.clip(linear[:, of_lengths], -_LARGEST, _LARGEST)
         linear = self.approximation.bent(scales, linear)
         volume = np.log(scales).sum(axis=1) - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1) + growth
         volume += self._log_volume
         volume[(np.abs(away) > _FAR).any(axis=1)] = -np.inf
-        return joined(self.approximation.model, scales, linear), linear[:, 0] + volume
+        return joined(self.approximation.model, scales, linear), linear[:, of_lengths].sum(axis=1) + volume
 
 
 def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:
@@ -112,7 +114,7 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
         several = np.tile(scales, (len(steps), 1))
         tried = approximation.bent(several, steps)
         density = observer.log_density(joined(model, several, tried))
-        density -= 0.5 * (np.square(tried - prior.mean) * prior.precision).sum(axis=1)
+        density -= 0.5 * np.square((tried - prior.mean) @ prior.root.T).sum(axis=1)
         linear, before, best = tried[np.argmax(density)], best, float(density.max())
         if best - before < _GAINED or deadline.has_passed:
             here = joined(model, scales[None], linear[None])
@@ -151,6 +153,17 @@ def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: 
 
 
 def _linear_prior(model: ContourModel, rng: np.random.Generator) -> LinearPrior:
-    draws = [np.asarray(model.priors[name].rvs(_DRAWS, random_state=rng)) for name in linear_names(model)]
-    draws[0] = np.log(draws[0])
-    return LinearPrior(np.mean(draws, axis=1), np.var(draws, axis=1) ** -1)
+    names, joint = linear_names(model), model.unknowns.joint
+    draws = [np.asarray(model.priors[name].rvs(_DRAWS, random_state=rng)) for name in names]
+    jointly = [] if joint is None else [names.index(name) for name in joint.priors]
+    if joint is not None:
+        for k, column in zip(jointly, joint.draw(rng, _DRAWS).T, strict=True):
+            draws[k] = column
+    for k in logarithms(model):
+        draws[k] = np.log(draws[k])
+    deviation = np.std(draws, axis=1)
+    correlation = np.eye(len(names))
+    if jointly:
+        correlation[np.ix_(jointly, jointly)] = np.corrcoef([draws[k] for k in jointly])
+    root = solve_triangular(np.linalg.cholesky(correlation), np.diag(1.0 / deviation), lower=True)
+    return LinearPrior(np.mean(draws, axis=1), deviation, root)
