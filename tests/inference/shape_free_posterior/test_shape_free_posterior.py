@@ -19,7 +19,7 @@ from tactile_bayes.inference.shape_free_posterior.whitening import _linear_prior
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
@@ -112,10 +112,11 @@ def test_coordinates_lead_back_and_a_volume_grows_as_they_say(rod, family):
 
 def test_the_prior_of_a_calibrated_rig_keeps_its_correlations():
     """Along both axes of two parameters the normal prior falls as the model's does; 4,000 draws leave 10 %."""
-    priors = {"drive_angle_offset": stats.norm(0.01, 0.02), "moment_bias": stats.norm(0.0, 0.1)}
+    priors = {"drive_angle_offset": stats.norm(0.01, 0.02), "backlash": stats.norm(0.0, 0.01)}
     calibration = RigPrior(priors, np.array([[1.0, 0.99], [0.99, 1.0]]), 0.0, "")
     measured = CELL.measure(scan(paper_profile("II", q=0.5), drive_step=np.radians(5.0)).record, rng=1)
-    rig = Rig(load_cell=CELL, unknown="nothing", calibration=calibration)
+    unknown = {name: value for name, value in NOTHING.items() if name not in priors}
+    rig = Rig(load_cell=CELL, unknown=unknown, calibration=calibration)
     model = Experiment(measured, rig, "shape-free").model
     prior = _linear_prior(model, np.random.default_rng(1))
     names = linear_names(model)
