@@ -89,3 +89,12 @@ def test_priors_stay_within_the_bounds_mostly(name):
     for parameter, prior in default_priors(family, (0.0, 0.0), 1.0).items():
         low, high = family.bounds[parameter]
         assert prior.cdf(high) - prior.cdf(low) > 0.999
+
+
+@pytest.mark.parametrize("length", [0.0, -0.2, np.inf])
+def test_a_flat_side_has_a_length(length):
+    family = FAMILIES["flat-sided"]
+    values = dict.fromkeys(family.parameters, 0.5)
+    assert family.contour(values).point(0.6)[0] > FAMILIES["shape-free"].contour(values).point(0.6)[0]
+    with refused(ContourError, "flat-sided", "flat_length"):
+        family.contour({**values, "flat_length": length})

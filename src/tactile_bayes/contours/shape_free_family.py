@@ -90,6 +90,10 @@ class ShapeFreeFamily(ContourFamily):
     def contour(self, values: Mapping[str, Any]) -> Contour:
         r, amplitude, length = (np.asarray(values[name]) for name in ("r", "amplitude", "length_scale"))
         refuse_unless((r > 0.0) & np.isfinite(r), self.name, "r must be positive and finite", r=r)
+        if self.has_flat:
+            flat = np.asarray(values["flat_length"])
+            rule = "flat_length must be positive and finite"
+            refuse_unless((flat > 0.0) & np.isfinite(flat), self.name, rule, flat_length=flat)
         rule = "amplitude must be finite and not negative"
         refuse_unless((amplitude >= 0.0) & np.isfinite(amplitude), self.name, rule, amplitude=amplitude)
         low, high = self.bounds["length_scale"]
