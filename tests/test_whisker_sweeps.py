@@ -62,7 +62,8 @@ def rigs(tmp_path_factory):
 @pytest.mark.parametrize(("series", "most"), [("series < 5", 6.0), ("series >= 5", 9.0)])
 def test_readings_at_known_points_are_explained(rigs, series, most):
     """Readings reach 3,200 counts; there and back, of which the rig is from the former, they differ by 6."""
-    points = replace(rigs[0], file={**rigs[0].format.table, "where": rigs[0].format.where.replace("series < 5", series)})
+    table = rigs[0].format.table
+    points = replace(rigs[0], file={**table, "where": table["where"].replace("series < 5", series)})
     probe = Gauge(tb.contours.Circle(r=1e-5, q=-1e-5))
     left = residuals(model_of("calibration_in_plane.csv", points, RIG, gauge=probe), RIG)
     assert left.size == 30
