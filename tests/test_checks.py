@@ -204,7 +204,7 @@ RIGHT = {
     **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), number(TINY, or_infinite=True)),
     **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), number()),
     **dict.fromkeys(("lever", "moment_curve"), pair),
-    **dict.fromkeys(("lag", "play"), AT_LEAST_0),
+    **dict.fromkeys(("lag", "lag_seconds", "play"), AT_LEAST_0),
     **dict.fromkeys(("drift", "frame", "calibration"), nothing),
     # Rods
     "length": number(0.1, 10.0),

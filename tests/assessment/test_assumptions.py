@@ -4,14 +4,16 @@ from scipy import stats
 
 from helpers.contour_posteriors import only, posterior, swept
 from tactile_bayes.assessment import assumptions as module
-from tactile_bayes.assessment.assumptions import alternatives_of, band_by_assumption
+from tactile_bayes.assessment.assumptions import alternatives_by_channel, alternatives_of, band_by_assumption
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.parameters import MEMORY
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import expanded
 
@@ -44,6 +46,29 @@ def test_each_unknown_is_added_or_fixed_and_each_other_family_tried():
     # Gains take the place of the rigidity, which has the same effect.
     gains = names_of("rigidity_scale")["gain inferred for rigidity_scale"]
     assert unknown_of(gains) == ("moment_gain", "force_x_gain", "force_y_gain")
+
+
+@pytest.mark.parametrize(("lag", "other"), [("lag", "lag_seconds"), ("lag_seconds", "lag")])
+def test_a_lag_is_tried_in_seconds_where_the_record_has_times_and_by_channel_on_demand(lag, other):
+    record = swept(Parabola(0.5, 0.5), step=0.1)
+    if lag == "lag_seconds":
+        record["time_s"] = ("sample", 0.1 * np.arange(record.sizes["sample"]))
+    experiment = Experiment(record, Rig(unknown=only("friction")))
+    names = {each.name for each in alternatives_of(experiment)}
+    assert {f"{lag} inferred", "play inferred"} < names
+    assert not any(other in name.split() or "_lag" in name or "_play" in name for name in names)
+    found = alternatives_by_channel(experiment, names)
+    assert [each.name for each in found] == [f"{name} inferred" for what in (lag, "play") for name in MEMORY[what]]
+    assert alternatives_by_channel(experiment, ["friction inferred"]) == []
+    experiment = Experiment(record, Rig(unknown=only(f"moment_{lag}")))
+    assert not any("lag" in each.name for each in alternatives_of(experiment) if each.kind == "added")
+
+
+def test_a_lag_as_stated_is_that_of_each_channel():
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02, lag=(0.1, 0.2, 0.3))
+    found = names_of(rig=Rig(load_cell=cell, unknown=only("lag")))["lag as stated"].experiment
+    assert found.unknowns.names == () == tuple(found.unknowns.known)
+    assert [found.unknowns.sensor[name] for name in MEMORY["lag"]] == [0.1, 0.2, 0.3]
 
 
 def test_what_is_fixed_has_the_value_that_rod_and_load_cell_state():

@@ -30,7 +30,11 @@ def inferred(rig, seed=1, **assumed):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize(
-    ("cause", "size"), [("taper", 0.15), ("lag", 1.5), ("play", 0.03), ("drift", 0.3), ("suspension_compliance", 0.15)]
+    ("cause", "size"),
+    [
+        *[("taper", 0.15), ("lag", 1.5), ("play", 0.03), ("drift", 0.3), ("suspension_compliance", 0.15)],
+        *[("moment_lag", 1.5), ("force_y_play", 0.03)],
+    ],
 )
 def test_what_is_wrong_is_named_first_and_describes_the_record(cause, size, seed):
     found = causes(inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0, cause: size}), seed), rng=seed)

@@ -13,7 +13,7 @@ from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.rig import NOTHING
-from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
+from tactile_bayes.rig.parameters import GROUPS, MEMORY, PARAMETERS
 from tactile_bayes.rig.rig_prior import RigPrior
 
 FALSE_ALARM = 1e-4
@@ -36,7 +36,7 @@ SI = {
 }
 NEVER_DRAWN = {
     *(name for group in ("gauge", "discrepancy", "rest_shape") for name in GROUPS[group]),
-    *("taper_error", "noise_scale", "moment_noise", "force_noise"),
+    *("taper_error", "noise_scale", "moment_noise", "force_noise", "lag_seconds", *MEMORY["lag_seconds"]),
 }
 EVERY = [name for name in PARAMETERS if name not in (*NEVER_DRAWN, "rigidity_scale")]
 

@@ -138,6 +138,8 @@ REFUSED = [
     ({"load_cell__frame": "loose"}, ["load_cell.frame is 'loose'"]),
     ({"load_cell__force_noise": -1.0}, ["load_cell", "force_noise is -1.0"]),
     ({"load_cell__force_noise": {"normal": [0.05, 0.001]}}, ["load_cell.force_noise may be negative"]),
+    ({"load_cell__lag_seconds_force_x": 0.1}, ["lag_seconds_force_x", "times"]),
+    ({"unknown": {"lag_seconds": "default"}}, ["lag_seconds", "times"]),
     ({"load_cell": {"force_resolution": 2.0, "force_range": 1.0}}, ["load_cell", "force_resolution is 2.0"]),
     ({**contour(q={"each": [0.3, 0.4, 0.5]}), "records": 25}, ["records is 25", "'each'", "3 combinations"]),
 ]

@@ -26,6 +26,7 @@ NORMAL = {
     "lever": cell(gain=GAIN, lever=(0.1, -0.2), relative_noise=0.2),
     "curve": cell(gain=GAIN, lever=(0.1, -0.2), moment_curve=(0.3, 0.1), bias=(0.1, -0.2, 0.3)),
     "memory": cell(gain=GAIN, lever=(0.1, -0.2), lag=0.7, play=0.1, bias=(0.1, -0.2, 0.3)),
+    "memory of channels": cell(gain=GAIN, lag=(0.7, 0.0, 2.0), play=(0.1, 0.3, 0.0)),
     "lag, relative, drift": cell(lag=3.0, relative_noise=0.2, drift=WALK),
     "curve, relative": cell(moment_curve=(-0.2, 0.05), relative_noise=0.2),
     "relative noise": cell(relative_noise=0.2, gain=GAIN, bias=(0.1, -0.2, 0.3)),
@@ -50,10 +51,11 @@ def moments(sheet: LoadCell, loads, noise_scale=(1.0, 1.0, 1.0)):
     """Mean, shape (3n,), and covariance of readings of loads (n, 3), sample by sample, written out."""
     n = len(loads)
     loads = np.array(loads, dtype=float)
-    for k in range(1, n if sheet.lag else 0):
-        loads[k] += np.exp(-1.0 / sheet.lag) * (loads[k - 1] - loads[k])
-    half, now = sheet.play * np.abs(loads).max(axis=0), np.zeros(3)
-    for k, c in np.ndindex(loads.shape if sheet.play else (0, 3)):
+    left = [np.exp(-1.0 / lag) if lag else 0.0 for lag in np.full(3, sheet.lag)]
+    for k in range(1, n):
+        loads[k] += left * (loads[k - 1] - loads[k])
+    half, now = np.full(3, sheet.play) * np.abs(loads).max(axis=0), np.zeros(3)
+    for k, c in np.ndindex(loads.shape):
         loads[k, c] = now[c] = min(max(now[c], loads[k, c] - half[c]), loads[k, c] + half[c])
     x, y = sheet.lever
     quadratic, cubic = sheet.moment_curve
@@ -96,6 +98,7 @@ def ideal(samples=5, missing=(), rod=None, **further):
 # ---- for hypothesis to draw
 
 _sizes = st.one_of(st.just(0.0), st.floats(1e-3, 1.0))
+_of_channels = st.one_of(_sizes, st.tuples(_sizes, _sizes, _sizes))
 _signed = st.floats(-1.0, 1.0)
 _drifts = st.one_of(
     st.none(), st.builds(RandomWalk, _sizes, _sizes), st.builds(OrnsteinUhlenbeck, _sizes, _sizes, st.floats(0.1, 1e3))
@@ -120,8 +123,8 @@ def load_cells(draw, frames=(None, "fixed", "turning")) -> LoadCell:
         gain=np.eye(3) + np.reshape(cross, (3, 3)),
         lever=draw(st.one_of(st.just((0.0, 0.0)), st.tuples(_signed, _signed))),
         moment_curve=draw(st.one_of(st.just((0.0, 0.0)), st.tuples(_signed, _signed))),
-        lag=draw(_sizes),
-        play=draw(_sizes),
+        lag=draw(_of_channels),
+        play=draw(_of_channels),
         force_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         moment_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         force_resolution=draw(_sizes),

@@ -9,6 +9,7 @@ from helpers.load_cells import cell, ideal, load_cells
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.load_cell.data_sheet import MEMORY
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, LOAD_CELL_UNITS, frame_of, to_dimensionless, write_record
 from tactile_bayes.rig import read_record
@@ -47,7 +48,7 @@ def test_variances_are_of_every_channel_and_finite(sheet, has_them):
         ("drift", [0.1, "random_walk", RandomWalk, (0.1, 0.1)]),
         ("frame", ["rotating", "", 1, ["fixed"], np.array(["fixed"])]),
         ("moment_curve", [(1.0,), (np.nan, 0.0), "bent"]),
-        *((name, [-0.1, np.nan, np.inf, "1", (0.1,)]) for name in ("lag", "play")),
+        *((name, [-0.1, np.nan, np.inf, "1", (0.1,), (0, 1, -1)]) for name in MEMORY),
     ],
 )
 def test_what_no_load_cell_has_is_refused(name, values):

@@ -11,6 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
+from tactile_bayes.record.times import times_of
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 STAMP, HEADER = TYPES.types["builtin_interfaces/msg/Time"], TYPES.types["std_msgs/msg/Header"]
@@ -91,6 +92,7 @@ def test_each_load_is_a_sample_at_the_angle_of_its_time(tmp_path, plugin):
     np.testing.assert_allclose(record.drive_angle, angle(times), rtol=1e-12)
     for name, expected in zip(("holding_moment", "force_x", "force_y"), loads(times), strict=True):
         np.testing.assert_allclose(record[name], expected, rtol=1e-12)
+    np.testing.assert_allclose(times_of(record), times - times[0], rtol=0, atol=1e-8)
     assert set(record.direction.values) == {"forward"}
     assert record.attrs["units"] == "SI"
     files = [*(tmp_path / "sweep").glob("*.mcap")]

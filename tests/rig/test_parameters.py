@@ -11,15 +11,16 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.profile import MOST_MODES
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, PARAMETERS, SENSOR, STANDARD, members, parameter_named
 
 MODES = [lambda s, k=k: np.cos(5.0 * k * s) for k in range(MOST_MODES)]
 ROD = Rod(0.2, 3e-4, rest_curvature=1.5, taper=0.3, stem=0.01, rest_shape_modes=MODES, taper_deviation=0.05)
 STATED = {"rest_curvature": 1.5, "taper": 0.3, "stem": 0.01, "length": 0.2}
 CELL = LoadCell(force_noise=0.05 * ROD.force_unit, moment_noise=0.02 * ROD.moment_unit, moment_curve=(2.0, 3.0))
-STATED |= {"moment_curve_quadratic": 2.0, "moment_curve_cubic": 3.0, "lag": 0.0, "play": 0.0}
+STATED |= {**dict.fromkeys(SENSOR, 0.0), "moment_curve_quadratic": 2.0, "moment_curve_cubic": 3.0}
 PIN = Circle(0.04, 0.1, 0.004)
 RECORD = swept(PIN, bases=((0.0, 0.0), (0.02, 0.006)), rod=ROD, step=0.1)
+RECORD["time_s"] = ("sample", np.arange(float(RECORD.sizes["sample"])))
 NAMES = (*PARAMETERS, "base_2_x", "base_2_y")
 
 

@@ -41,6 +41,9 @@ CELLS = {
         gain=((1.0, 0.0, 0.02), (0.01, 1.1, 0.0), (0.0, 0.03, 0.95)),
         lever=(-0.01, 0.04),
         moment_curve=(0.01, 0.002),
+        lag=(0.5, 1.0, 0.0),
+        lag_seconds=0.1,
+        play=(0.01, 0.0, 0.02),
         drive_angle_offset=-0.02,
         drive_angle_backlash=0.01,
         drive_angle_noise=0.001,
@@ -153,10 +156,15 @@ stem = "3 mm"
 force_noise = "5 mN"
 moment_noise = "0.2 mN m"
 lever = ["1 mm", "-2 mm"]
+lag = [1.0, 0.0, 2.0]
+lag_seconds = ["50 ms", 0.0, "0.2 s"]
+play = 0.01
+play_force_x = 0.02
 drive_angle_offset = "1 deg"
 
 [unknown]
 lever_x = "0.5 mm"
+lag_seconds = "20 ms"
 drive_angle_offset = "2 deg"
 moment_bias = { normal = ["0 mN m", "1 mN m"] }
 base_2_x = "3 mm"
@@ -164,7 +172,7 @@ length = { normal = ["201 mm", "1 mm"] }
 """
 
 
-@pytest.mark.parametrize("name", ["bias", "bias_uncertainty", "gain", "lever", "moment_curve", "correlation"])
+@pytest.mark.parametrize("name", ["bias", "bias_uncertainty", "gain", "lever", "moment_curve", "correlation", "lag"])
 def test_entries_of_several_numbers_are_lists(tmp_path, name):
     value = np.ravel(getattr(CELLS["everything"], name)).tolist()
     rig = read(tmp_path / "rig.toml", f"[load_cell]\n{name} = {value}\n")
@@ -178,7 +186,10 @@ def test_units_are_texts(tmp_path):
     assert rig.load_cell.moment_noise == pytest.approx(2e-4)
     assert rig.load_cell.lever == pytest.approx((1e-3, -2e-3))
     assert rig.load_cell.drive_angle_offset == pytest.approx(np.radians(1.0))
-    assert rig.known == pytest.approx({"lever_x": 5e-4, "drive_angle_offset": np.radians(2.0), "base_2_x": 3e-3})
+    assert (rig.load_cell.lag, rig.load_cell.play) == ((1.0, 0.0, 2.0), (0.01, 0.02, 0.01))
+    assert rig.load_cell.lag_seconds == pytest.approx((0.05, 0.0, 0.2))
+    known = {"lever_x": 5e-4, "lag_seconds": 0.02, "drive_angle_offset": np.radians(2.0), "base_2_x": 3e-3}
+    assert rig.known == pytest.approx(known)
     assert rig.distributions["moment_bias"].std() == pytest.approx(1e-3)
     assert rig.distributions["length"].mean() == pytest.approx(0.201)
 
@@ -274,6 +285,8 @@ WRONG = {
     "a length alone": ("[rod]\nlength = 0.1", "flexural_rigidity"),
     "a modulus alone": ("[rod]\nlength = 0.1\nyoungs_modulus = 1e11", "diameter"),
     "a shape alone": ("[rod]\nshape = 'shape.csv'", "flexural_rigidity"),
+    "a lag in seconds": ("[load_cell]\nlag = '50 ms'", "lag_seconds"),
+    "two of three lags": ("[load_cell]\nlag = [1.0, 2.0]", "lag_force_y"),
     "too few": ("[load_cell]\nlever = [0.1]", "lever"),
     "no distribution": ("[unknown]\nfriction = { wide = 1.0 }", "unknown.friction"),
     "no width": ("[unknown]\nfriction = { normal = [0.1, 0.0] }", "give the number"),

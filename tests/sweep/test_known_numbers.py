@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import bases_of
 from tactile_bayes.rig import NOTHING
-from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
+from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, SENSOR
 
 NOT_SWEPT = {*GROUPS["gauge"], *GROUPS["discrepancy"], "moment_noise", "force_noise"}
 KNOWN = {name: value for name, value in EVERY.items() if name not in GROUPS["gauge"]}
@@ -33,7 +33,8 @@ def test_a_scan_that_is_read_is_what_inference_expects(name, length):
     said = {**NOTHING, **(every if name == "all" else {name: known[name]})}
     rig = Rig(rod if length else replace(ROD), cell, said)
     swept = scan(contour, rig, drive=[Rotation(base, drive_step=0.1) for base in bases])
-    record = rig.measure(swept.record, rng=1)
+    times = np.cumsum(np.random.default_rng(1).uniform(20.0, 200.0, swept.record.sizes["sample"]))
+    record = rig.measure(swept.record.assign(time_ms=("sample", times)), rng=1)
     assert record.attrs["units"] == ("SI" if length else "dimensionless")
     np.testing.assert_allclose(bases_of(record), bases, rtol=0, atol=1e-15)
     assert_expected(record, rig, vars(contour), 1e-9)
@@ -82,7 +83,8 @@ def test_a_drawn_rig_has_numbers_alone():
 def test_a_plan_has_known_numbers():
     rod, cell, contour, bases, known = scaled(0.1, 2e-4)
     noises = {"force_noise": 0.05 * rod.force_unit, "moment_noise": 0.02 * rod.moment_unit}
-    said = {**NOTHING, **{n: known[n] for n in KNOWN if n not in ("noise_scale", "taper_error", "lag", "play")}}
+    left = ("noise_scale", "taper_error", *SENSOR[2:])
+    said = {**NOTHING, **{name: known[name] for name in KNOWN if name not in left}}
     plan = Plan(
         contour, Rig(rod, replace(cell, **noises), said), drive=[Rotation(base, drive_step=0.1) for base in bases]
     )

@@ -14,15 +14,16 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.comparison.families import SHAPES
 from tactile_bayes.diagnostics.inspection.inspection import Inspection, inspect_record
 from tactile_bayes.diagnostics.predictive_check import predictive_check
-from tactile_bayes.errors import ParameterError, StudyError, TactileBayesError
+from tactile_bayes.errors import ParameterError, RecordError, StudyError, TactileBayesError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.misfit import is_inferred
 from tactile_bayes.inference.parameters.unknowns import belongs
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
-from tactile_bayes.record import CHANNELS, rod_of
+from tactile_bayes.record import CHANNELS, present_channels, rod_of
 from tactile_bayes.rig.parameters import COMPLIANCES, MEMORY, STANDARD
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.rig.unknown import DEFAULT
@@ -126,19 +127,32 @@ def alternatives_of(experiment: Experiment, seen: Inspection | None = None) -> l
     return [*found, *(Alternative(f"family {name}", "family", replace(experiment, family=name)) for name in families)]
 
 
+def alternatives_by_channel(experiment: Experiment, names: Collection[str]) -> list[Alternative]:
+    """Return for each alternative, by its name, that adds a lag or play of all channels those with it in one alone."""
+    kinds = [what for what in MEMORY if f"{what} inferred" in names and len(present_channels(experiment.record)) > 1]
+    return [each for what in kinds for name in MEMORY[what] for each in _added(experiment, name)]
+
+
 def _as_stated(experiment: Experiment, names: Collection[str]) -> Experiment:
     """Return the experiment in which some parameters of the rig are known to be as stated."""
     stated = stated_values(rod_of(experiment.record), experiment.noise.cell)
     rig = experiment.rig
     found = None if rig.calibration is None else rig.calibration.without(names)
-    said = {**rig.entries, **{name: stated.get(name, 0.0) for name in names}}
+    said = {name: value for name, value in rig.entries.items() if name not in names}
+    own = {name: stated.get(name, 0.0) for name in names}
+    said |= {n: value for n, value in own.items() if not np.isnan(value)}  # NaN is a lag of channels that differ
     return replace(experiment, rig=replace(rig, unknown=said, calibration=found))
 
 
 def _added(experiment: Experiment, group: str) -> list[Alternative]:
     """Return the alternative in which a parameter of the rig, or a group, is unknown; none if no record shows it."""
     names, label, other = experiment.unknowns.names, f"{group} inferred", experiment
-    if group in MEMORY and "blocks" in experiment.record.attrs:  # the samples between are gone
+    kind = next((what for what in MEMORY if belongs(group, what)), "")
+    if kind and "blocks" in experiment.record.attrs:  # the samples between are gone
+        return []
+    if "lag" in kind and is_inferred("lag", names):
+        return []
+    if kind == "lag" and _added(experiment, f"{group}_seconds"):  # in place of it, since the record has times
         return []
     if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
         label += " for rigidity_scale"
@@ -146,7 +160,7 @@ def _added(experiment: Experiment, group: str) -> list[Alternative]:
     other = replace(other, rig=other.rig.with_unknown(**{group: DEFAULT}))
     try:
         is_shown = bool(set(other.unknowns.names) - set(names))
-    except ParameterError:  # it has the same effect as another unknown
+    except (ParameterError, RecordError):  # it has the same effect as another unknown, or there are no times
         return []
     return [Alternative(label, "added", other)] if is_shown else []
 

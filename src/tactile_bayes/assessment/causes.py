@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.assessment.assumptions import Alternative, alternatives_of, stated_cell
+from tactile_bayes.assessment.assumptions import Alternative, alternatives_by_channel, alternatives_of, stated_cell
 from tactile_bayes.diagnostics.findings import Finding
 from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.errors import TactileBayesError
@@ -81,13 +83,15 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     own = _optimum(experiment, starts, seed, deadline)
     if own.fits and (outliers := [finding for finding in seen.messages if finding.kind == "outlier"]):
         return _of_readings(outliers)  # its optimum bears them, and the posterior does not
-    found = []
-    for each in alternatives_of(experiment, seen):
-        if each.kind != "fixed":
-            try:
-                found.append((each, _optimum(each.experiment, starts, seed, deadline)))
-            except TactileBayesError:  # what cannot be tried is no cause
-                continue
+
+    def tried(alternatives: list[Alternative]) -> Iterator[tuple[Alternative, ContourOptimum]]:
+        for each in alternatives:
+            with suppress(TactileBayesError):  # what cannot be tried is no cause
+                yield each, _optimum(each.experiment, starts, seed, deadline)
+
+    found = [*tried([each for each in alternatives_of(experiment, seen) if each.kind != "fixed"])]
+    better = [each.name for each, one in found if one.log_evidence > own.log_evidence]
+    found += tried(alternatives_by_channel(experiment, better))
     found.sort(key=lambda one: (not one[1].fits, -one[1].log_evidence))
     return xr.Dataset(
         {

@@ -11,7 +11,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import GROUPS, parameter_named
-from tactile_bayes.rig.stated import rod_with, sensor_values
+from tactile_bayes.rig.stated import by_channel, of_all_channels, rod_with, sensor_values
 
 _NOISES = ("force_noise", "moment_noise", "relative_noise")
 
@@ -32,6 +32,7 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
         "length": rod.length,
         **sensor_values(cell),
         **known,
+        **of_all_channels(by_channel(sensor_values(cell), known)),
     }
     if rod.rest_curvature != stated.rest_curvature:
         values |= dict.fromkeys(GROUPS["rest_shape"])
@@ -40,7 +41,7 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     found = {}
     for name in dict.fromkeys((*drawn, *assumed.priors)):
         value, factor = values.get(name, _neutral(name)), times.get(name, 1.0)
-        if value is not None and math.isfinite(factor):
+        if value is not None and math.isfinite(factor * value):
             found[name] = factor * (value + more.get(name, 0.0))
     return found
 

@@ -105,7 +105,7 @@ def _default(parameter: Parameter) -> str:
         return f"{kind} {parameter.width:g}"
     if parameter.unit == "rad":
         return f"{kind} {math.degrees(parameter.width):.3g}°"
-    unit = _UNITS[parameter.unit == "N", parameter.of_moment, parameter.of_length]
+    unit = "s" if parameter.unit == "s" else _UNITS[parameter.unit == "N", parameter.of_moment, parameter.of_length]
     return f"{kind} {parameter.width:g} {unit}".strip()
 
 

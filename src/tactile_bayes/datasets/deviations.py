@@ -14,7 +14,7 @@ from tactile_bayes.datasets.variations import Variation, quantity_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.drawn import calibrated_at, unknown_of
-from tactile_bayes.rig.parameters import GROUPS, NEUTRAL, SENSOR, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, MEMORY, NEUTRAL, parameter_named
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.rig.rig_file import unit_of_unknown
 from tactile_bayes.rig.rig_prior import RigPrior
@@ -119,7 +119,7 @@ def _stated(values: Mapping[str, Floats], count: int) -> Stated:
 
     length, rigidity = column("rod.length", 1.0), column("rod.flexural_rigidity", 1.0)
     of_rod = {name: column(f"rod.{name}") for name in ("rest_curvature", "taper", "stem")}
-    sensor = {name: column(f"load_cell.{name}") for name in SENSOR}
+    sensor = {name: column(f"load_cell.{name}") for name in GROUPS["moment_curve"]}
     gains = [np.abs(column(f"load_cell.gain_{name}_{name}", 1.0)) for name in CHANNELS]
     return Stated(
         ManyUnits(length, rigidity / length, rigidity / length**2),
@@ -160,9 +160,13 @@ def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats
     for name, entry in _OF_CELL.items():
         if name in off:
             built[f"load_cell.{entry}"] = built.get(f"load_cell.{entry}", zero) + off[name]
-    for name in SENSOR:
+    for name in GROUPS["moment_curve"]:
         if name in off:
             built[f"load_cell.{name}"] = off[name]
+    for what, names in MEMORY.items():
+        keys = [f"load_cell.{what}_{channel}" for channel in CHANNELS]
+        built |= dict.fromkeys(keys, off[what]) if what in off else {}
+        built |= {key: off[name] for key, name in zip(keys, names, strict=True) if name in off}
     gains = dict(zip(CHANNELS, GROUPS["gain"], strict=True))
     for to, of in product(CHANNELS, CHANNELS):
         key = f"load_cell.gain_{to}_{of}"

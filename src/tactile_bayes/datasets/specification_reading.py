@@ -178,6 +178,9 @@ def _specification(table: Mapping[str, Any], text: str) -> Specification:
         frame=cast(Frame, frame),
         single=check_choice("precision", said["precision"], ("double", "single")) == "single",
     )
+    if timed := [name for name in (*found.load_cell, *found.unknown) if "lag_seconds" in name]:
+        what = f"{timed[0]} is in seconds, and records of a data set have no times: give lag, in readings"
+        raise SpecificationError(what)
     turns = found.combinations
     records = table.get("records", turns if found.lists else None)
     records = _whole(records, "records", 1, _MOST_SHARDS * found.shard_records)

@@ -41,7 +41,8 @@ class ContourProblem(NamedTuple):
     def without(self, samples: Flags) -> ContourModel:
         """Return the model of the record without some samples, a mask of shape (samples,)."""
         model, kept = self.model, ~samples
-        rig = replace(model.unknowns, elapsed=model.unknowns.elapsed[kept])
+        elapsed, times = model.unknowns.elapsed[kept], model.unknowns.times
+        rig = replace(model.unknowns, elapsed=elapsed, times=None if times is None else times[kept])
         measured = model.measured.isel(sample=np.flatnonzero(kept))
         return ContourModel(measured, model.family, rig, model.noise, model.priors)
 

@@ -26,7 +26,7 @@ _SMOOTH = "shape-free"
 
 def is_inferred(suspect: str, unknowns: Collection[str]) -> bool:
     """Return True if an unknown of a rig, or one of its group, is among the inferred ones."""
-    return any(belongs(name, suspect) for name in unknowns)
+    return any(belongs(name, what) for name in unknowns for what in (suspect, f"{suspect}_seconds"))
 
 
 def what_to_try(families: Collection[str], unknowns: Collection[str] = (), *, friction: float = 0.0) -> str:

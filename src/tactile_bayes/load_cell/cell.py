@@ -77,12 +77,13 @@ class LoadCell(DataSheet):
         whose reading is not in proportion to the moment, as a Hall sensor. Where the curve turns back, the sensor is
         saturated, and reads the same from there on. With counts in the column of the moment the gain is in counts per
         N m.
-    lag : float
-        Time constant of a lag of first order, in readings: that of a low-pass filter over the time between readings.
-        Memory runs on from one sweep of a record to the next.
-    play : float
-        Play in each channel, which makes a loop of hysteresis: half of the loop's width over the channel's largest load
-        in a record. 0.001 for a good cell, 0.01 or more for a glued or printed one.
+    lag, lag_seconds : float or (float, float, float)
+        Time constant of a lag of first order, of all channels or of each, in readings, and in seconds for a record with
+        a column of times, such as "time [s]" or time_ms: that of a low-pass filter. Both add up. Memory runs on from
+        one sweep of a record to the next.
+    play : float or (float, float, float)
+        Play in all channels or in each, which makes a loop of hysteresis: half of the loop's width over the channel's
+        largest load in a record. 0.001 for a good cell, 0.01 or more for a glued or printed one.
     force_range, moment_range : float
         Largest size of a reading, at which readings are cut off (with a resolution, at the last step in the range). A
         bridge is typically rated to twice the largest expected load.

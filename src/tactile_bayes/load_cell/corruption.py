@@ -20,15 +20,17 @@ def corrupted_loads(
     noise_scale: ArrayLike = 1.0,
     discrepancy: Discrepancy | None = None,
     zeros: ArrayLike = 0.0,
+    times: Floats | None = None,
 ) -> Floats:
     """Simulate readings of loads: memory, lever, gain and bias, drift, noise and discrepancy, the range, and the steps.
 
-    Shapes: loads (..., samples, 3), noise_scale (..., 3) → (..., samples, 3); `zeros` add to the bias.
+    Shapes: loads (..., samples, 3), noise_scale (..., 3), times [s] (samples,) → (..., samples, 3); `zeros` add to the
+    bias.
     """
     noise = rng.standard_normal(loads.shape)
     if any(sheet.correlation):
         noise = noise @ np.linalg.cholesky(sheet.correlation_matrix).T
-    loads = remembered(loads, sheet.lag, sheet.play)
+    loads = remembered(loads, (sheet.lag, sheet.lag_seconds, sheet.play), times)
     readings = sheet.expected(loads) + np.asarray(zeros)
     if any(sheet.bias_uncertainty):
         readings += np.array(sheet.bias_uncertainty) * rng.standard_normal((*loads.shape[:-2], 1, 3))

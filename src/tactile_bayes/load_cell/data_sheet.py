@@ -33,6 +33,8 @@ Triple = tuple[float, float, float]
 
 # Deterministic entries: known errors, for which a record can be corrected.
 CERTAIN = ("bias", "gain", "lever", "moment_curve", "drive_angle_offset", "drive_angle_backlash")
+# Entries of the memory: one number for all channels, or three.
+MEMORY = ("lag", "lag_seconds", "play")
 _LOADS = f"give an array of shape (..., 3), with the channels {', '.join(CHANNELS)}"
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -46,6 +48,7 @@ SEVERAL: dict[str, tuple[str, ...]] = {
     "lever": ("lever_x", "lever_y"),
     "moment_curve": ("moment_curve_quadratic", "moment_curve_cubic"),
     "correlation": tuple(f"correlation_{one}_{other}" for one, other in _PAIRS),
+    **{name: tuple(f"{name}_{channel}" for channel in CHANNELS) for name in MEMORY},
 }
 _OF_CHANNELS = f"give three finite numbers ({', '.join(CHANNELS)})"
 _CORRECTIONS = {
@@ -61,12 +64,14 @@ _CORRECTIONS = {
         for channel, unit in (("force", "N"), ("moment", "N m"), ("drive_angle", "rad"))
     },
     "relative_noise": "give a share, zero or positive",
-    "lag": "give a number of readings, zero or positive",
-    "play": "give a share of the largest load, zero or positive",
+    **{
+        name: f"give {what}, zero or positive, or three ({', '.join(CHANNELS)})"
+        for name, what in zip(MEMORY, ("readings", "seconds", "a share of the largest load"), strict=True)
+    },
     **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), "give an angle [rad]"),
     **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), "give a positive number, inf for none"),
 }
-_SCALARS = tuple(name for name in LOAD_CELL_UNITS if name in _CORRECTIONS)
+_SCALARS = tuple(name for name in LOAD_CELL_UNITS if name in _CORRECTIONS and name not in MEMORY)
 
 
 @dataclass(frozen=True)
@@ -84,8 +89,9 @@ class DataSheet:
     gain: tuple[Triple, Triple, Triple] = _IDENTITY
     lever: tuple[float, float] = (0.0, 0.0)
     moment_curve: tuple[float, float] = (0.0, 0.0)
-    lag: float = 0.0
-    play: float = 0.0
+    lag: float | Triple = 0.0
+    lag_seconds: float | Triple = 0.0
+    play: float | Triple = 0.0
     force_range: float = math.inf
     moment_range: float = math.inf
     force_resolution: float = 0.0
@@ -100,10 +106,13 @@ class DataSheet:
         for name in _SCALARS:
             object.__setattr__(self, name, self._number(name))
         for name, names in SEVERAL.items():
-            shape = (3, 3) if name == "gain" else (len(names),)
-            numbers = check_numbers(f"the load cell's {name}", getattr(self, name), _CORRECTIONS[name], shape=shape)
-            rows = map(tuple, numbers.tolist()) if name == "gain" else numbers.tolist()
-            object.__setattr__(self, name, tuple(rows))
+            shape, value = (3, 3) if name == "gain" else (len(names),), getattr(self, name)
+            least = -math.inf
+            if name in MEMORY:
+                least, value = 0.0, value if as_number(value) is None else (value,) * 3
+            numbers = check_numbers(f"the load cell's {name}", value, _CORRECTIONS[name], shape=shape, least=least)
+            rows = tuple(map(tuple, numbers.tolist()) if name == "gain" else numbers.tolist())
+            object.__setattr__(self, name, rows[0] if name in MEMORY and len(set(rows)) == 1 else rows)
         self._refuse_the_impossible()
         if self.drift is not None and not np.any(self.drift.sizes):
             object.__setattr__(self, "drift", None)
@@ -210,9 +219,9 @@ class DataSheet:
     @property
     def straight(self) -> Self:
         """The same without the curve of the moment, and without memory."""
-        if not any((*self.moment_curve, self.lag, self.play)):
+        if not any((*self.moment_curve, self.lag, self.lag_seconds, self.play)):
             return self
-        return replace(self, moment_curve=(0.0, 0.0), lag=0.0, play=0.0)
+        return replace(self, moment_curve=(0.0, 0.0), lag=0.0, lag_seconds=0.0, play=0.0)
 
     def cut(self, readings: Floats) -> Floats:
         """Return readings, shape (..., 3), cut off at the ends of the range."""
@@ -304,7 +313,8 @@ class DataSheet:
         for name in _SCALARS:
             yield name, float(getattr(self, name))
         for name, names in SEVERAL.items():
-            yield from zip(names, np.ravel(getattr(self, name)).tolist(), strict=True)
+            numbers = np.ravel(getattr(self, name)).tolist()
+            yield from zip(names if len(numbers) > 1 else (name,), numbers, strict=True)
             if name == "bias_uncertainty" and self.drift is not None:
                 prefix = _DRIFTS[type(self.drift)]
                 yield from ((f"{prefix}_{field.name}", getattr(self.drift, field.name)) for field in fields(self.drift))
@@ -321,7 +331,7 @@ class DataSheet:
         options: dict[str, Any] = {name: entries[name] for name in (*_SCALARS, "frame") if name in entries}
         ideal = dict(DataSheet()._all_entries())
         for name, names in SEVERAL.items():
-            numbers = [entries.get(one, ideal[one]) for one in names]
+            numbers = [entries.get(one, entries.get(name, ideal.get(one, 0.0))) for one in names]
             options[name] = [numbers[:3], numbers[3:6], numbers[6:]] if name == "gain" else numbers
         processes = [kind for kind, prefix in _DRIFTS.items() if any(name.startswith(f"{prefix}_") for name in entries)]
         if len(processes) > 1:

@@ -44,7 +44,7 @@ def log_likelihood(
     if not present.size:
         batch = np.broadcast_shapes(scale.shape[:-1], loads.shape[:-2])
         return np.zeros((*batch, len(readings)) if pointwise else batch)
-    loads = remembered(loads, sheet.lag, sheet.play)
+    loads = remembered(loads, (sheet.lag, sheet.lag_seconds, sheet.play))
     expected = sheet.expected(loads)
     deviation = np.asarray(sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale))
     if present.size < len(CHANNELS):

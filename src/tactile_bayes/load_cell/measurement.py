@@ -16,6 +16,7 @@ from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.load_cell.data_sheet import CERTAIN, DataSheet
 from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, loads_of, present_channels, validate
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
+from tactile_bayes.record.times import times_of
 
 _PREFIX = "load_cell_"
 _TAKEN_OUT = tuple(
@@ -29,7 +30,8 @@ def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator, zer
     made = validate(record if sheet.frame is None else in_frame(record, sheet.frame))
     entries = _after(sheet, stated_entries(made)).entries()
     present = present_channels(made)
-    readings = corrupted_loads(sheet, loads_of(made), rng, zeros=zeros)
+    times = times_of(made) if np.any(sheet.lag_seconds) else None
+    readings = corrupted_loads(sheet, loads_of(made), rng, zeros=zeros, times=times)
     for index, channel in enumerate(CHANNELS):
         if channel not in present:
             continue

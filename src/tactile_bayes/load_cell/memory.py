@@ -1,44 +1,64 @@
 """The memory of a sensor: a lag of first order, and play, which makes a loop of hysteresis.
 
 Both act on the loads of a record in its order. With a lag of n readings a share c = exp(−1/n) of the difference is left
-at each reading, yₖ = xₖ + c (yₖ₋₁ − xₖ): a steady change is read c/(1 − c) readings late. With play of half a width r
-the output stays where it is until the input is further from it than r, and follows at that distance: yₖ is yₖ₋₁, moved
-into xₖ ± r (the play operator of Krasnosel'skii and Pokrovskii 1989, doi 10.1007/978-3-642-61302-9). The lag starts at
-the first reading, and play without load.
+at each reading, yₖ = xₖ + c (yₖ₋₁ − xₖ): a steady change is read c/(1 − c) readings late. A lag of τ seconds is one of
+n = τ/Δt readings, Δt after the one before. With play of half a width r the output stays where it is until the input is
+further from it than r, and follows at that distance: yₖ is yₖ₋₁, moved into xₖ ± r (the play operator of Krasnosel'skii
+and Pokrovskii 1989, doi 10.1007/978-3-642-61302-9). The lag starts at the first reading, and play without load.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.errors import ParameterError
+
+_NO_TIME = 1e-300  # [s]
 
 
-def remembered(loads: Floats, lag: Any, play: Any) -> Floats:
-    """Return loads, shape (n, ..., samples, 3), as a sensor with memory reads them: lag, then play.
+def remembered(loads: Floats, memory: Iterable[Any], times: Floats | None = None) -> Floats:
+    """Return loads, shape (..., samples, 3), as a sensor with memory reads them: lag, then play.
 
-    Lags [samples] and plays, shares of the largest load of each channel, are numbers or have the shape (n,).
+    A memory is a lag in readings, one in seconds, and a play, as a share of the largest load of each channel, which
+    broadcast against loads, and are the same for all samples, whose times [s] have the shape (samples,).
     """
-    lag, play = (np.reshape(value, (-1, *(1,) * (loads.ndim - 2))) for value in (lag, play))
+    lag, lag_seconds, play = memory
+    if np.any(lag_seconds):
+        if times is None:
+            raise ParameterError(
+                "lag_seconds of the load cell says nothing of loads without times: take a record with a column of "
+                "times, or give its lag in readings"
+            )
+        with np.errstate(over="ignore"):
+            lag = lag + lag_seconds / steps_of(times)
     if np.any(lag):
-        loads = _delayed(loads, lag)
-    return _loose(loads, play * np.abs(loads).max(axis=-2)) if np.any(play) else loads
+        loads = _delayed(loads, np.asarray(lag))
+    return _loose(loads, (play * np.abs(loads).max(axis=-2, keepdims=True))[..., 0, :]) if np.any(play) else loads
 
 
-def delay_of(lag: float) -> float:
-    """Return by how many samples a steady change is read late."""
+def steps_of(times: Floats) -> Floats:
+    """Return the times from the samples before to each, shape (samples, 1), hardly any to the first."""
+    return np.maximum(np.diff(times, prepend=times[:1]), _NO_TIME)[:, None]
+
+
+def delays_of(lag: Any, lag_seconds: Any, times: Floats) -> Floats:
+    """Return how late a steady change is read at each sample, shape (samples, 3), in the unit of the times."""
+    steps = steps_of(times)
     with np.errstate(divide="ignore", over="ignore"):
-        return float(1.0 / np.expm1(1.0 / np.float64(lag)))
+        late = steps / np.expm1(steps / (np.asarray(lag) * steps + np.asarray(lag_seconds)))
+    return np.broadcast_to(late, (times.size, 3))
 
 
 def _delayed(loads: Floats, lag: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         left = np.exp(-1.0 / lag)
-    out = loads.copy()
+    left, out = np.broadcast_to(left, np.broadcast_shapes(left.shape, (loads.shape[-2], 1))), loads.copy()
     for k in range(1, loads.shape[-2]):
-        out[..., k, :] += left * (out[..., k - 1, :] - loads[..., k, :])
+        out[..., k, :] += left[..., k, :] * (out[..., k - 1, :] - loads[..., k, :])
     return out
 
 

@@ -21,7 +21,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.data_sheet import CERTAIN
+from tactile_bayes.load_cell.data_sheet import CERTAIN, MEMORY
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.planning.record_information import ReadingSlopes, reading_slopes
@@ -135,7 +135,7 @@ class Plan:
 
     def certain(self, record: xr.Dataset) -> xr.Dataset:
         """Return an ideal record as the load cell reads it without random errors."""
-        certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "lag", "play", "frame")})
+        certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, *MEMORY, "frame")})
         return replace(self.rig, load_cell=certain).measure(record, rng=0)
 
     def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:

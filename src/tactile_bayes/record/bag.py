@@ -38,7 +38,8 @@ def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
 
     Drive angle and base are interpolated linearly to its time, an angle after its jumps by a turn are undone; other
     loads are those of the nearest message, and everything else is that of the last one. A sample is left out if another
-    column has no values around it, or pauses there for more than five times its usual interval.
+    column has no values around it, or pauses there for more than five times its usual interval. The column "time" is
+    that since the first sample [s].
 
     Times are those of headers, or all those of reception if headers of a topic go back, state one time for different
     values, or have another clock than other topics. A message that is in the bag again counts once.
@@ -181,6 +182,7 @@ def _table(topics: Mapping[str, Topic], times: Mapping[str, Index], asked: list[
                 raise _ClockError(f"no message of {main.topic} is between two of {column.name} that follow as usual")
         cells[column.name] = _at(own, values, at, column) if own.size else np.full(at.size, "")
     table: dict[str, Cells] = {name: (values[known], {}) for name, values in cells.items()}
+    table["time"] = (at[known] - at[known][:1]) / 1e9, {"units": "s"}
     return Table(table, {}, Source(source.name, names=list(table)))
 
 

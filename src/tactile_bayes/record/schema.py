@@ -97,8 +97,11 @@ LOAD_CELL_UNITS: Mapping[str, str] = {
     "lever_y": "m",
     "moment_curve_quadratic": "1/N/m",
     "moment_curve_cubic": "1/N²/m²",
-    "lag": "1",
-    "play": "1",
+    **{
+        entry: unit
+        for name, unit in (("lag", "1"), ("lag_seconds", "s"), ("play", "1"))
+        for entry in (name, *(f"{name}_{channel}" for channel in CHANNELS))
+    },
     "force_range": "N",
     "moment_range": "N m",
     "force_resolution": "N",

@@ -14,12 +14,14 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
 from tactile_bayes.load_cell.blocks import are_blocks, elapsed_in
 from tactile_bayes.load_cell.measurement import measured
-from tactile_bayes.load_cell.memory import delay_of
+from tactile_bayes.load_cell.memory import delays_of
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import CHANNELS, base_of_sample, frame_of, present_channels, rod_of, to_si, with_rod
 from tactile_bayes.record.attributes import without_rod
 from tactile_bayes.record.construction import completed_record, table_of_columns
+from tactile_bayes.record.schema import column_of
+from tactile_bayes.record.times import times_of
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.stated import cell_with, rod_with
 from tactile_bayes.rig.unknown import pivot_shifts
@@ -60,9 +62,10 @@ def corrected(given: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) 
     fraction = elapsed_in(given)
     drifts = zip(CHANNELS, (rig.get(name, 0.0) for name in GROUPS["drift"]), strict=True)
     columns = {name: given[name] - drift * fraction for name, drift in drifts if drift}
-    if cell.lag and given.sizes["sample"] > 1:  # play stays, since what it hides is lost
-        later = delay_of(cell.lag) / (given.sizes["sample"] - 1)
-        columns |= {name: _ahead(columns.get(name, given[name]), fraction, later) for name in CHANNELS}
+    if np.any(cell.lag) or np.any(cell.lag_seconds):  # play stays, since what it hides is lost
+        times = times_of(given) if np.any(cell.lag_seconds) else np.arange(float(given.sizes["sample"]))
+        delays = zip(CHANNELS, delays_of(cell.lag, cell.lag_seconds, times).T, strict=True)
+        columns |= {name: _ahead(columns.get(name, given[name]), times, delay) for name, delay in delays}
     columns |= {name: given[name] + shift for name, shift in _shifts(given, rig)}
     record = given.assign({name: values.assign_attrs(given[name].attrs) for name, values in columns.items()})
     rod = rod_of(given)
@@ -70,7 +73,7 @@ def corrected(given: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) 
         record = to_si(record, rod)
     return Corrected(
         with_rod(record, rod_with(rod, rig)),
-        replace(cell, lag=0.0, play=0.0),
+        replace(cell, lag=0.0, lag_seconds=0.0, play=0.0),
         rig.get("friction", 0.0),
         rig.get("suspension_compliance", 0.0) * stiffer,
         rig.get("contact_compliance", 0.0) * stiffer,
@@ -87,6 +90,7 @@ def measured_by(
     drift = np.array([known.get(name, 0.0) for name in GROUPS["drift"]])
     made = measured(built, record, generator(rng), elapsed_in(record)[:, None] * drift)
     columns: dict[str, Any] = {str(name): made[name].values for name in made.data_vars}
+    columns |= {name: made[name] for name in columns if column_of(name) is None}  # with their units
     columns |= {name: columns[name] - shift for name, shift in _shifts(made, known)}
     attrs = {n: v for n, v in without_rod(made.attrs).items() if not str(n).startswith(("load_cell_", "units"))}
     attrs |= {f"load_cell_{name}": value for name, value in stated.entries().items() if name != "frame"}
@@ -94,9 +98,9 @@ def measured_by(
     return completed_record(table_of_columns(columns, attrs), rod, missing, frame_of(made))
 
 
-def _ahead(readings: xr.DataArray, elapsed: Floats, lag: float) -> xr.DataArray:
-    """Return readings as they are later by a lag, both as a share of the record: to first order those without it."""
-    return readings.copy(data=np.interp(elapsed + lag, elapsed, readings.values))
+def _ahead(readings: xr.DataArray, times: Floats, delay: Floats) -> xr.DataArray:
+    """Return readings as they are later by a delay: to first order those without a lag."""
+    return readings.copy(data=np.interp(times + delay, times, readings.values))
 
 
 def _shifts(record: xr.Dataset, rig: Mapping[str, float]) -> Iterator[tuple[str, Floats]]:

@@ -65,6 +65,12 @@ def _of_channels(what: str, meaning: str) -> Iterator[Parameter]:
         yield Parameter(f"{channel}_{what}", meaning.format(channel), unit, "normal", 0.1, of_moment=1)
 
 
+def _memory(what: str, meaning: str, unit: str, width: float) -> Iterator[Parameter]:
+    """Yield a property of the memory of all channels, and that of each."""
+    for prefix, of in (("", "all channels"), *((f"{channel}_", channel) for channel in _CHANNELS)):
+        yield Parameter(f"{prefix}{what}", meaning.format(of), unit, "half_normal", width, None, 0.0)
+
+
 _ROWS = (
     Parameter(
         "rigidity_scale",
@@ -123,16 +129,9 @@ _ROWS = (
         of_moment=-2,
         hidden=_NO_MOMENT,
     ),
-    Parameter("lag", "lag of first order of all channels, in readings", "1", "half_normal", 1.0, None, 0.0),
-    Parameter(
-        "play",
-        "hysteresis of each channel: half the loop's width over its largest load",
-        "1",
-        "half_normal",
-        0.01,
-        None,
-        0.0,
-    ),
+    *_memory("lag", "lag of first order of {}, in readings", "1", 1.0),
+    *_memory("lag_seconds", "lag of first order of {}, where the record has times", "s", 0.2),
+    *_memory("play", "hysteresis of {}: half the loop's width over the largest load", "1", 0.01),
     Parameter(
         "suspension_compliance",
         "turn of the pivot per holding moment",
@@ -248,9 +247,11 @@ GROUPS = {
 }
 # Ways in which what is not the rod yields.
 COMPLIANCES = ("suspension_compliance", "contact_compliance")
-# Parameters of the memory of a load cell, and all that replace what it states of itself.
-MEMORY = ("lag", "play")
-SENSOR = (*GROUPS["moment_curve"], *MEMORY)
+# Parameters of the memory of a load cell, with those of each channel that go before, and all that replace what it
+# states of itself.
+MEMORY = {what: tuple(f"{channel}_{what}" for channel in _CHANNELS) for what in ("lag", "lag_seconds", "play")}
+_OF_MEMORY = tuple(name for what, names in MEMORY.items() for name in (what, *names))
+SENSOR = (*GROUPS["moment_curve"], *_OF_MEMORY)
 # What is unknown of a real rig, unless it is said to be known.
 STANDARD = (
     "rigidity_scale",
@@ -263,7 +264,7 @@ STANDARD = (
     "taper_error",
 )
 # Parameters that are zero or positive, and may be zero.
-MAY_VANISH = ("friction", *COMPLIANCES, "taper", "stem", *MEMORY)
+MAY_VANISH = ("friction", *COMPLIANCES, "taper", "stem", *_OF_MEMORY)
 
 
 def parameter_named(name: str) -> Parameter | None:

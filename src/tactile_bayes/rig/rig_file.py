@@ -43,7 +43,7 @@ ROD_UNITS = {
 }
 TABLES = {
     "rod": (*ROD_UNITS, "rigidity_profile", "rest_shape_modes", "taper_deviation", "shape"),
-    "load_cell": ("frame", *LOAD_CELL_UNITS, *SEVERAL),
+    "load_cell": tuple(dict.fromkeys(("frame", *LOAD_CELL_UNITS, *SEVERAL))),
     "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), *OPTIONS),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
@@ -245,7 +245,7 @@ def _load_cell(said: Mapping[str, Any], is_si: bool) -> LoadCell:
 def entries_of_cell(said: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
     """Yield the entries that a table of a load cell states, without its frame: name, key for messages, and value."""
     for name, value in said.items():
-        if name in SEVERAL:
+        if name in SEVERAL and (isinstance(value, list) or name not in LOAD_CELL_UNITS):
             names = SEVERAL[name]
             rows = np.ravel(np.array(value, dtype=object)).tolist() if isinstance(value, list) else []
             if len(rows) != len(names):
@@ -315,8 +315,9 @@ def number_in(value: Any, *, unit: str, name: str, is_si: bool) -> float | None:
     stated, wanted = unit_of(said or "1"), unit_of(unit)
     assert wanted is not None
     if stated is None or stated.dimension != wanted.dimension:
-        raise ParameterError(f"{name} is {value!r}, which is not in {accepted_units(unit)}")
-    if not is_si and any(wanted.dimension[:3]):
+        what = f"{name} is {value!r}, which is not in {accepted_units(unit)}"
+        raise ParameterError(f"{what}: a lag in seconds is lag_seconds" if name.endswith("lag") else what)
+    if not is_si and any(wanted.dimension[:2]):
         raise ParameterError(
             f"{name} is {value!r}, but the rig is dimensionless: give [rod] with length and flexural_rigidity, or a "
             "number in units of the rod (L, EI/L, EI/L²)"

@@ -14,7 +14,7 @@ from tactile_bayes.distributions import Distribution, open_share
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, MEMORY, NEUTRAL, SENSOR, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, MEMORY, NEUTRAL, parameter_named
 
 _LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
@@ -46,13 +46,30 @@ def stated_values(rod: Rod, cell: LoadCell) -> dict[str, float]:
 
 def sensor_values(cell: LoadCell) -> dict[str, float]:
     """Return what a load cell states of its curve and its memory, by parameter."""
-    return dict(zip(SENSOR, (*cell.moment_curve, cell.lag, cell.play), strict=True))
+    own = {name: v for what in MEMORY for name, v in zip(MEMORY[what], np.full(3, getattr(cell, what)), strict=True)}
+    return {**dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True)), **of_all_channels(own)}
+
+
+def by_channel(*said: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the memory of each channel by what is said of parameters, the last first, and of a channel before all."""
+    found: dict[str, Any] = {}
+    for each in said:
+        for what, names in MEMORY.items():
+            found |= dict.fromkeys(names, each[what]) if what in each else {}
+            found |= {name: each[name] for name in names if name in each}
+    return found
+
+
+def of_all_channels(own: Mapping[str, float]) -> dict[str, float]:
+    """Return the memory of each channel, and of all; NaN if they differ."""
+    values = {what: [own[name] for name in names] for what, names in MEMORY.items()}
+    return {**own, **{what: each[0] if len({*each}) == 1 else np.nan for what, each in values.items()}}
 
 
 def memory_in(*said: Mapping[str, Any]) -> set[str]:
     """Return the kinds of memory that a load cell has or may have, by what is said of parameters, the last first."""
-    every = {name: value for each in said for name, value in each.items()}
-    return {name for name in MEMORY if every.get(name)}
+    found = by_channel(*said)
+    return {what for what, names in MEMORY.items() if any(found.get(name) for name in names)}
 
 
 class Stated(NamedTuple):
@@ -119,15 +136,16 @@ def cell_with(cell: LoadCell, rig: Mapping[str, float]) -> LoadCell:
         np.add(stated, [rig.get(name, 0.0) for name in GROUPS[what]]).tolist()
         for what, stated in (("bias", cell.bias), ("lever", cell.lever))
     )
-    quadratic, cubic, lag, play = (rig.get(name, value) for name, value in sensor_values(cell).items())
+    stated = sensor_values(cell)
+    own = {**stated, **rig, **by_channel(stated, rig)}
+    several = {"moment_curve": GROUPS["moment_curve"], **MEMORY}
+    sensor: dict[str, Any] = {what: [own[name] for name in names] for what, names in several.items()}
     return replace(
         cell,
         gain=gain.tolist(),
         bias=bias,
         lever=lever,
-        moment_curve=(quadratic, cubic),
-        lag=lag,
-        play=play,
+        **sensor,
         drive_angle_offset=cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
         drive_angle_backlash=cell.drive_angle_backlash + rig.get("backlash", 0.0),
     )

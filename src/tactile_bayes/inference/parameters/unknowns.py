@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,12 +17,13 @@ from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
-from tactile_bayes.load_cell.memory import remembered
+from tactile_bayes.load_cell.memory import remembered, steps_of
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
-from tactile_bayes.rig.parameters import BASE, COMPLIANCES, GROUPS, PARAMETERS, SENSOR, parameter_named
-from tactile_bayes.rig.stated import Stated, memory_in, sensor_values, stated_values, unit_of
+from tactile_bayes.record.times import times_of
+from tactile_bayes.rig.parameters import BASE, COMPLIANCES, GROUPS, MEMORY, PARAMETERS, SENSOR, parameter_named
+from tactile_bayes.rig.stated import Stated, by_channel, memory_in, sensor_values, stated_values, unit_of
 from tactile_bayes.rig.unknown import of_modes, of_pivots
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ class Unknowns:
     joint: RigPrior | None = None  # prior that a calibration found; `priors` are its marginals
     sensor: Mapping[str, float] = field(default_factory=dict)  # stated values of `SENSOR`, dimensionless
     pivots: int = 1
+    times: Floats | None = None  # of the samples [s], if a lag is in seconds
 
     @cached_property
     def units(self) -> dict[str, float]:
@@ -72,22 +74,28 @@ class Unknowns:
         """Coulomb's coefficient, if it is known; 0 if it is inferred."""
         return self.known.get("friction", 0.0)
 
-    @property
+    @cached_property
     def memory(self) -> set[str]:
         """Kinds of memory that the load cell has or may have, by which a sample depends on all before it."""
         return memory_in(self.sensor, self.known, dict.fromkeys(self.names, True))
 
     def longest_lag(self, priors: Mapping[str, Distribution]) -> float:
-        """Return the lag of the readings, if it is unknown its median in the prior and two standard deviations."""
-        if "lag" in self.names:
-            return float(priors["lag"].median() + 2.0 * priors["lag"].std())  # type: ignore[attr-defined]
-        return self.known.get("lag", self.sensor.get("lag", 0.0))
+        """Return the lag [readings], if it is unknown its median in the prior and two standard deviations."""
+        lag, seconds = (
+            self._largest(what, priors, lambda prior: prior.median() + 2.0 * prior.std())
+            for what in ("lag", "lag_seconds")
+        )
+        return lag if self.times is None else lag + seconds / float(np.median(steps_of(self.times)))
 
     def most_play(self, priors: Mapping[str, Distribution]) -> float:
         """Return the play of the readings over the largest load, if it is unknown its 95 % quantile in the prior."""
-        if "play" in self.names:
-            return float(priors["play"].ppf(0.95))  # type: ignore[attr-defined]
-        return self.known.get("play", self.sensor.get("play", 0.0))
+        return self._largest("play", priors, lambda prior: prior.ppf(0.95))
+
+    def _largest(self, what: str, priors: Mapping[str, Any], most: Callable[[Any], float]) -> float:
+        """Return the largest lag or play of a channel, of an unknown one what `most` says of its prior."""
+        unknown = {name: most(priors[name]) for name in self.names if belongs(name, what)}
+        found = by_channel(self.sensor, self.known, unknown)
+        return float(max(found.get(name, 0.0) for name in MEMORY[what]))
 
     @property
     def of_path(self) -> tuple[str, ...]:
@@ -144,9 +152,12 @@ class Unknowns:
         cell reads as such without its own curve.
         """
         values = self._with_known(values)
-        *curve, lag, play = (self._dimensionless(values, name, self.sensor.get(name, 0.0)) for name in SENSOR)
-        if np.any(lag) or np.any(play):
-            loads[...] = remembered(loads, lag, play)
+        if self.memory:
+            of = by_channel(self.sensor, values)
+            every = ([_by_point(of.get(name, 0.0), loads) for name in names] for names in MEMORY.values())
+            memory = (np.stack(np.broadcast_arrays(*three), axis=-1) for three in every)
+            loads[...] = remembered(loads, memory, self.times)
+        curve = [self._dimensionless(values, name, self.sensor.get(name, 0.0)) for name in GROUPS["moment_curve"]]
         is_bent = any(np.any(v) for v in curve)
         gains = [values.get(name) for name in GROUPS["gain"]]
         levers = [self._dimensionless(values, name) for name in GROUPS["lever"]]
@@ -178,7 +189,8 @@ class Unknowns:
 
 def belongs(name: str, group: str) -> bool:
     """Return True for the name of a parameter, or of one of a group."""
-    return name == group or name in GROUPS.get(group, ()) or (group == "base" and bool(BASE.fullmatch(name)))
+    members = GROUPS.get(group, MEMORY.get(group, ()))
+    return name == group or name in members or (group == "base" and bool(BASE.fullmatch(name)))
 
 
 def _by_point(values: Floats | float, loads: Floats) -> Floats:
@@ -211,17 +223,20 @@ def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool =
     if "stem" in names:
         _refuse_shifted_stem(measured, names, gauge)
     known = {n: v for n, v in said.items() if isinstance(v, float) and (gauge or n not in GROUPS["gauge"])}
+    known, sensor = deviating(known, names, rod, cell), sensor_values(cell.dimensionless(rod))
+    is_timed = "lag_seconds" in memory_in(sensor, known, dict.fromkeys(names, True))
     stated = Stated.of(rod, cell)
     priors = {n: stated.default(n) if isinstance(v := said[n], str | float) else v for n in names if n not in of_joint}
     return Unknowns(
         names,
         priors | of_joint,
         rod,
-        deviating(known, names, rod, cell),
+        known,
         elapsed_in(measured),
         joint,
-        sensor_values(cell.dimensionless(rod)),
+        sensor,
         pivots,
+        times_of(measured) if is_timed else None,
     )
 
 
@@ -277,7 +292,8 @@ def deviating(known: Mapping[str, float], unknown: Collection[str], rod: Rod, ce
     """Return the known parameters that are not as stated, and a curvature that would change with the length."""
     stated = stated_values(rod, cell)
     off = {name: value for name, value in known.items() if value != stated.get(name, 0.0)}
-    kept = ("rest_curvature",) if "length" in (*unknown, *off) else ()
+    beside: dict[str, tuple[str, ...]] = {"length": ("rest_curvature",), **MEMORY}
+    kept = [name for other in (*unknown, *off) for name in beside.get(other, ())]
     return {name: value for name, value in known.items() if name in off or name in kept}
 
 
@@ -297,6 +313,5 @@ def _refuse_shifted_stem(measured: xr.Dataset, names: Sequence[str], gauge: bool
 
 def _is_shown(name: str, present: Sequence[str]) -> bool:
     """Return True if a measured channel depends on a parameter."""
-    channel, _, what = name.rpartition("_")
-    is_measured = channel in present or name not in GROUPS.get(what, ())
-    return is_measured and (name not in (*GROUPS["lever"], *GROUPS["moment_curve"]) or "moment" in present)
+    absent = tuple(f"{channel}_" for channel in _SHORT.values() if channel not in present)
+    return not name.startswith(absent) and (name not in GROUPS["lever"] or "moment" in present)
