@@ -20,6 +20,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw
 from tactile_bayes.planning.amplification import along_and_across
 from tactile_bayes.rig import make_record
+from tactile_bayes.sweep import scan_many
 from tactile_bayes.tasks import one_thread
 
 REFERENCE = Path(__file__).parents[1] / "data" / "synthetic" / "reference"
@@ -146,13 +147,13 @@ def contours(rng: np.random.Generator, number: int, count: int) -> Contour:
 
 def record_of(drawn: Contour, direction: str, count: int, rng: np.random.Generator) -> xr.Dataset:
     """Return a record of the first `count` contours that can be swept, at random drive angles of each sweep."""
-    events = tb.scan_many(drawn, np.full((drawn.shape[0], 1), np.pi / 2), direction=direction)
+    events = scan_many(drawn, np.full((drawn.shape[0], 1), np.pi / 2), direction=direction)
     good = np.flatnonzero(events.status.values == "ok")[:count]
     share = np.concatenate([rng.uniform(*PLACES[place], (count, SAMPLES[place])) for place in PLACES], axis=1)
     share = np.sort(share, axis=1)  # places follow one another
     first, last = (events[f"{when}_drive_angle"].values[good, None] for when in ("first_contact", "snap_off"))
     angles = first + (last - first) * share
-    swept = tb.scan_many(drawn.take(good), angles, direction=direction)
+    swept = scan_many(drawn.take(good), angles, direction=direction)
     readings = ("holding_moment", "force_x", "force_y", "drive_angle")
     truths = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "contact_phase")
     columns = {name: swept[name].values.ravel() for name in readings}

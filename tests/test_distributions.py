@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactile_bayes import infer_point_load
 from tactile_bayes.distributions import (
     KINDS,
     check_distribution,
@@ -18,6 +17,7 @@ from tactile_bayes.distributions import (
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.parameters.priors import widened
+from tactile_bayes.inference.point_load import infer_point_load
 from tactile_bayes.rig import Rig
 
 NAN = float("nan")

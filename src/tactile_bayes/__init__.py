@@ -55,15 +55,15 @@ _HOMES = {
     "infer_contacts": "inference.contact_posterior",
     "infer_contour": "inference.contour",
     "infer_contours": "runs.many",
-    "infer_point_load": "inference.point_load",
     "inspect_record": "diagnostics.inspection",
     "make_record": "rig",
     "read_record": "rig",
     "read_result": "inference.result",
     "reconstruct": "reconstruction",
+    "result": "inference.target",
     "scan": "sweep",
-    "scan_many": "sweep",
     "sensitivity": "planning.sensitivity",
+    "target": "inference.target",
     "to_arviz": "inference.result",
     "trust": "assessment.trust",
     "write_record": "record",
@@ -99,11 +99,12 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.contour import infer_contour as infer_contour
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
     from tactile_bayes.inference.family import Family as Family
-    from tactile_bayes.inference.point_load import infer_point_load as infer_point_load
     from tactile_bayes.inference.result import read_result as read_result
     from tactile_bayes.inference.result import to_arviz as to_arviz
     from tactile_bayes.inference.result import write_result as write_result
     from tactile_bayes.inference.streams.stream import Stream as Stream
+    from tactile_bayes.inference.target import result as result
+    from tactile_bayes.inference.target import target as target
     from tactile_bayes.load_cell import LoadCell as LoadCell
     from tactile_bayes.mechanics.rods.rod import Rod as Rod
     from tactile_bayes.planning.design import design as design
@@ -120,7 +121,6 @@ if TYPE_CHECKING:
     from tactile_bayes.sweep import Translation as Translation
     from tactile_bayes.sweep import equilibria as equilibria
     from tactile_bayes.sweep import scan as scan
-    from tactile_bayes.sweep import scan_many as scan_many
     from tactile_bayes.uncertainty.band import contour_band as contour_band
     from tactile_bayes.uncertainty.gap import gap as gap
 

@@ -320,6 +320,18 @@ def log_density_of(distribution: Distribution) -> Callable[[Floats], Floats]:
     return partial(closed, **{name: float(value) for name, value in values.items()})
 
 
+def quantiles_of(distribution: Distribution, name: str) -> Callable[[Floats], Floats]:
+    """Return the quantile function of the prior of a parameter, in a closed form for those of `KINDS`."""
+    kind = KINDS.get(_NAMES.get(getattr(getattr(distribution, "dist", None), "name", ""), ""))
+    numbers = kind.numbers(numbers_of(distribution)) if kind else None
+    if kind is not None and numbers is not None:
+        return partial(kind.at, *numbers)
+    if not hasattr(distribution, "ppf"):
+        raise ParameterError(f"the prior of {name} has no quantile function: give it a method ppf")
+    quantiles: Callable[[Floats], Floats] = distribution.ppf
+    return quantiles
+
+
 def _norm(x: Floats, *, loc: float, scale: float) -> Floats:
     return np.asarray(-0.5 * ((x - loc) / scale) ** 2 - (_ROOT_2PI + math.log(scale)))
 

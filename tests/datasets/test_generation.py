@@ -19,6 +19,7 @@ from tactile_bayes.datasets.specification import left_out
 from tactile_bayes.errors import SpecificationError, StrainWarning
 from tactile_bayes.record import loads_of
 from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.sweep import scan_many
 
 FALSE_ALARM = 1e-4  # of each statistical test here
 RANGES = {
@@ -241,7 +242,7 @@ def test_draws_in_vain_are_counted_with_their_reasons():
         bits = np.random.PCG64(np.random.SeedSequence(5, spawn_key=(i, 0))).advance(draw * 2**20)
         shares[i, draw] = np.random.Generator(bits).random(4)
     circles = Circle((0.2 + 0.6 * shares[..., 1]).ravel(), (-0.3 + 2.0 * shares[..., 2]).ravel())
-    many = [tb.scan_many(circles, [1.0], direction=direction) for direction in ("forward", "backward")]
+    many = [scan_many(circles, [1.0], direction=direction) for direction in ("forward", "backward")]
     assert np.all(many[0].status == many[1].status)  # the circles stand above the pivot
     clear = (many[0].clear & many[1].clear).values.reshape(60, 40)
     status = many[0].status.values.reshape(60, 40)

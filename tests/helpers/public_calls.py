@@ -16,10 +16,12 @@ import tactile_bayes as tb
 from helpers import comparisons
 from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, swept
 from tactile_bayes.diagnostics.inspection import Inspection
+from tactile_bayes.inference.point_load import infer_point_load
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
 from tactile_bayes.planning.error_map import Bands
 from tactile_bayes.rig import FileFormat, Rig
+from tactile_bayes.sweep import scan_many
 
 PARABOLA = tb.contours.Parabola(0.5, 0.5)
 STATED = Rig(load_cell=CELL, unknown="nothing")
@@ -42,6 +44,7 @@ _SLOW = (
         "inference.contour.spawn",
         "inference.point_load.sample",
         "inference.contact_posterior.posterior.draw_contacts",
+        "inference.target.whole_groups",
     ),
     *("comparison.families.walk_of", "calibration.calibrate.replicate", "calibration.calibrate.make_replicate"),
     *("assessment.trust.sampling_error", "report.writing.page_of"),
@@ -85,6 +88,11 @@ def ideal() -> xr.Dataset:
 @functools.cache
 def measured() -> xr.Dataset:
     return CELL.measure(ideal(), rng=1)
+
+
+@functools.cache
+def target():
+    return tb.target(measured(), rig=STATED)
 
 
 @functools.cache
@@ -300,7 +308,7 @@ def _rod_and_sweep_calls() -> dict[str, Call]:
         "Motion": right(tb.Motion, **motion, drive_step=0.1),
         "Motion.at": right(tb.Motion(**motion).at, travels=[0.0, 0.5]),
         "scan": right(tb.scan, contour=PARABOLA, drive_step=0.1),
-        "scan_many": right(tb.scan_many, contours=two, drive_angles=np.linspace(0.5, 3.5, 20)),
+        "scan_many": right(scan_many, contours=two, drive_angles=np.linspace(0.5, 3.5, 20)),
         "equilibria": right(tb.equilibria, contour=PARABOLA, slope_angles=[0.1]),
         "elastica.tangential_arclength": right(elastica.tangential_arclength, **contact, slope_angle=0.1),
         "elastica.wrench_from_contact": right(elastica.wrench_from_contact, **contact, slope_angle=[0.1]),
@@ -375,7 +383,9 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         "Family.of": right(tb.Family.of, posterior=posterior()),
         "Family.only": right(tb.Family("circle").only, r=0.2),
         "infer_contacts": right(tb.infer_contacts, measured=measured(), rig=STATED, rng=1, draws=40),
-        "infer_point_load": right(tb.infer_point_load, **deflections, rng=1, settings=BRIEF),
+        "infer_point_load": right(infer_point_load, **deflections, rng=1, settings=BRIEF),
+        "target": right(tb.target, measured=measured(), rig=STATED),
+        "result": right(tb.result, target=target(), draws=np.full((2, 10, 4), [0.5, 0.5, 0.0, 1.0]), rng=1),
         "compare_families": right(tb.compare_families, **sampled, measured=measured(), families=["parabola", "circle"]),
         "SamplerSettings": right(tb.SamplerSettings),
         "SamplerSettings.walkers_for": right(tb.SamplerSettings().walkers_for, parameters=4),

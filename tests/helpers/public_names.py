@@ -1,6 +1,7 @@
 """The public names, as the pages of the API list them."""
 
 import importlib
+import inspect
 import pathlib
 import re
 
@@ -13,10 +14,8 @@ PREFIXES = {
     "tactile_bayes.mechanics.elastica": "elastica.",
 }
 # Modules of what functions return or raise.
-RESULTS = {
-    f"tactile_bayes.{name}"
-    for name in ("errors", "sweep", "diagnostics", "diagnostics.inspection", "load_cell.discrepancy")
-}
+_ROOMS = ("errors", "sweep", "diagnostics", "diagnostics.inspection", "inference.target", "load_cell.discrepancy")
+RESULTS = {f"tactile_bayes.{name}" for name in _ROOMS}
 
 
 def listed():
@@ -30,8 +29,9 @@ def listed():
 def public():
     """(module, name, name in tables of calls) of what the pages of the API list, but for results and errors."""
     for module, names in listed():
-        for name in names if module.__name__ not in RESULTS else ():
-            yield module, name, PREFIXES.get(module.__name__, "") + name
+        for name in names:
+            if module.__name__ not in RESULTS or not inspect.isclass(getattr(module, name)):
+                yield module, name, PREFIXES.get(module.__name__, "") + name
 
 
 def left_out():

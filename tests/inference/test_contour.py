@@ -79,7 +79,7 @@ def test_moments_are_those_of_a_grid():
 def test_layout():
     result = posterior()
     assert result.attrs["converged"], result.attrs["message"]
-    groups = {"posterior", "sample_stats", "prior", "posterior_predictive", "log_likelihood", "events"}
+    groups = {"posterior", "sample_stats", "log_prior", "prior", "posterior_predictive", "log_likelihood", "events"}
     assert set(result.children) == groups | {"observed_data", "constant_data"}
     assert list(result["posterior"].data_vars) == NAMES
     chains, draws = 2, 24 * result["sample_stats"].attrs["steps_kept"]
@@ -87,8 +87,9 @@ def test_layout():
     assert all(result["posterior"][name].dims == ("chain", "draw") for name in NAMES)
     samples = measured().sizes["sample"]
     kept = result["events"].sizes["draw"]
-    assert dict(result["log_likelihood"].sizes) == {"chain": chains, "draw": kept, "sample": samples}
-    assert dict(result["posterior_predictive"].sizes) == {"chain": chains, "draw": kept, "sample": samples}
+    by_sample = {"chain": chains, "draw": kept, "sample": samples}
+    assert dict(result["log_likelihood"].sizes) == {**by_sample, "channel": 3}
+    assert dict(result["posterior_predictive"].sizes) == by_sample
     assert result["events"].segment.values.tolist() == ["forward", "backward"]
     assert dict(result["prior"].sizes) == {"chain": 1, "draw": 1000}
     assert 0.0 < result["prior"].attrs["share_within_reach"] < 1.0
@@ -107,7 +108,8 @@ def test_log_probability_is_prior_plus_stored_likelihood():
     kept = result["posterior"].to_dataset().sel(draw=result["log_likelihood"].draw)
     priors = Experiment(measured(), Rig(load_cell=CELL)).priors
     expected = sum(priors[name].logpdf(kept[name].values) for name in NAMES)
-    expected = expected + result["log_likelihood"]["record"].sum("sample").values
+    np.testing.assert_allclose(result["log_prior"]["prior"].sel(draw=kept.draw), expected, rtol=1e-12)
+    expected = expected + result["log_likelihood"]["record"].sum(("sample", "channel")).values
     found = result["sample_stats"]["lp"].sel(draw=kept.draw).values
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
@@ -371,7 +373,7 @@ def test_a_posterior_is_kept_before_anything_is_made_of_it(monkeypatch):
     with pytest.raises(MemoryError):
         infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF, keep=kept.append)
     (tree,) = kept
-    assert set(tree.children) == {"posterior", "sample_stats", "observed_data", "constant_data"}
+    assert set(tree.children) == {"posterior", "sample_stats", "log_prior", "observed_data", "constant_data"}
     assert tree["posterior"].sizes["draw"] == 240
     assert tree.attrs["message"].startswith("not converged")
 

@@ -10,12 +10,13 @@ from helpers.expected_readings import assert_expected
 from helpers.known_numbers import KNOWN as EVERY
 from helpers.known_numbers import PIN, ROD, scaled
 from helpers.refusals import refused
-from tactile_bayes import LoadCell, Rig, Rod, Rotation, Translation, equilibria, scan, scan_many
+from tactile_bayes import LoadCell, Rig, Rod, Rotation, Translation, equilibria, scan
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import bases_of
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, SENSOR
+from tactile_bayes.sweep import scan_many
 
 NOT_SWEPT = {*GROUPS["gauge"], *GROUPS["discrepancy"], "moment_noise", "force_noise"}
 KNOWN = {name: value for name, value in EVERY.items() if name not in GROUPS["gauge"]}

@@ -9,6 +9,7 @@ from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import Rig
+from tactile_bayes.sweep import scan_many
 
 TRUTH = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 ANGLES = np.linspace(0.4, 3.6, 240)
@@ -31,7 +32,7 @@ CONTOURS = {
 @pytest.mark.parametrize(("direction", "friction"), [("forward", 0.0), ("backward", 0.3)])
 def test_each_is_what_its_own_scan_says(contours, direction, friction):
     rig = Rig(rod=ROD, unknown={"friction": friction})
-    many = tb.scan_many(contours, ANGLES, direction=direction, base=BASE, rig=rig)
+    many = scan_many(contours, ANGLES, direction=direction, base=BASE, rig=rig)
     assert set(many.status.values) == {"ok"}
     for i in range(COUNT):
         base = tuple(float(value[i]) for value in BASE)
@@ -60,12 +61,12 @@ def test_a_small_fall_beside_a_sharp_vertex_is_no_snap_off():
     """The drive angle falls by 4e-6 rad before the vertex, where the radius of curvature is zero, and rises again."""
     vertex = 0.6637, 1.6517, 0.4240, -0.8370
     alone = tb.scan(PowerLaw(*vertex), direction="backward").events["backward"]
-    many = tb.scan_many(PowerLaw(*np.array(vertex)[:, None]), ANGLES, direction="backward")
+    many = scan_many(PowerLaw(*np.array(vertex)[:, None]), ANGLES, direction="backward")
     assert many.snap_off_drive_angle.item() == pytest.approx(alone.snap_off.drive_angle, abs=1e-12)
 
 
 def test_what_cannot_be_swept_says_why():
-    many = tb.scan_many(Circle(np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.4, 1.2, -0.1, 0.01])), ANGLES)
+    many = scan_many(Circle(np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.4, 1.2, -0.1, 0.01])), ANGLES)
     assert many.status.values.tolist() == ["ok", "out of reach", "cuts the pivot", "too close to the pivot"]
     lost = many.isel(contour=slice(1, None))
     assert not np.any(lost.holding_moment)
@@ -90,4 +91,4 @@ def test_what_cannot_be_swept_says_why():
 )
 def test_what_does_not_fit_is_refused(arguments, options, named):
     with refused(ParameterError, *named):
-        tb.scan_many(*arguments, **options)
+        scan_many(*arguments, **options)

@@ -12,9 +12,10 @@ import tactile_bayes as tb
 from helpers.friction_cases import drawn_case, scanned
 from helpers.friction_stepper import step_through
 from helpers.handed_out import violations
-from tactile_bayes import Rig, scan_many
+from tactile_bayes import Rig
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ClearanceWarning, ContourError, ReachError
+from tactile_bayes.sweep import scan_many
 
 PARABOLA = Parabola(0.6, 0.45, 0.1)
 UPRIGHT = 0.5 * np.pi

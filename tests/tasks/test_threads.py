@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tactile_bayes as tb
+from tactile_bayes.sweep import scan_many
 from tactile_bayes.tasks import in_parts, one_thread
 
 
@@ -67,6 +68,6 @@ def test_an_error_of_a_part_is_raised():
 def test_sweeps_do_not_depend_on_threads():
     rng = np.random.default_rng(1)
     contours = tb.contours.Parabola(rng.uniform(0.3, 2.0, 60), rng.uniform(0.3, 0.8, 60), rng.uniform(-0.3, 0.3, 60))
-    many = tb.scan_many(contours, [0.2, 0.5, 0.9])
+    many = scan_many(contours, [0.2, 0.5, 0.9])
     with one_thread():
-        assert many.identical(tb.scan_many(contours, [0.2, 0.5, 0.9]))
+        assert many.identical(scan_many(contours, [0.2, 0.5, 0.9]))

@@ -16,6 +16,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
+from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem, identity_of
 from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -242,11 +243,7 @@ def sampled(
             # A run that resumes from a checkpoint must start at the same points, whatever the time limit was.
             problem, walk = _likeliest(problem, seeds[0], settings, NEVER if checkpoint is not None else deadline)
         model = problem.model
-        if walk.beyond:
-            raise InferenceError(
-                f"the best fit is outside the priors, at {walk.beyond}: give wider ones, or check units, rod and base. "
-                + what_to_try([model.family.name], model.unknowns.names, friction=model.unknowns.friction)
-            )
+        _refuse_beyond(model, walk)
         is_brief = walk.is_hopeless and settings.max_steps is None
         steps = _STEPS_OF_A_VERDICT if is_brief else settings.max_steps
         draws = sample(
@@ -275,6 +272,22 @@ def sampled(
     whole = xr.DataTree.from_dict({**{name: group.to_dataset() for name, group in tree.children.items()}, **groups})
     whole.attrs = tree.attrs
     return Sampled(whole, draws, walk.coordinates)
+
+
+def started(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Walk:
+    """Return the start of walkers in the posterior of a model."""
+    walk = walk_of(model, seed, settings)
+    _refuse_beyond(model, walk)
+    return walk
+
+
+def _refuse_beyond(model: ContourModel, walk: Walk) -> None:
+    """Refuse a start whose parameters fit the record far better beyond the ends of their priors."""
+    if walk.beyond:
+        raise InferenceError(
+            f"the best fit is outside the priors, at {walk.beyond}: give wider ones, or check units, rod and base. "
+            + what_to_try([model.family.name], model.unknowns.names, friction=model.unknowns.friction)
+        )
 
 
 def _likeliest(

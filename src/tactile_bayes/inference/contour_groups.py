@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.inference.contour_model import ContourModel
@@ -20,12 +21,13 @@ from tactile_bayes.rig.parameters import parameter_named
 
 _KEPT_DRAWS = 250  # largest number of draws of each chain for which predictions and events are stored
 # Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
-# 4,000 samples on.
+# 2,700 samples on.
 _STORED_NUMBERS = 16_000_000
 FEWEST_PREDICTIONS = 100  # least number of predictions that the check of the record requires
 _PATHS = 200  # number of contours whose paths are followed at a time
 _PRIOR_DRAWS = 1000
-_BY_SAMPLE = ("chain", "draw", "sample")
+_BY_DRAW = ("chain", "draw")
+_BY_SAMPLE = (*_BY_DRAW, "sample")
 
 
 def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
@@ -34,16 +36,24 @@ def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
     return {
         "posterior": _labelled(model, draws.samples, np.arange(draws.samples.shape[1])),
         "sample_stats": sample_stats(draws),
+        "log_prior": _log_prior(model, draws),
         "observed_data": xr.Dataset({name: record[name] for name in CHANNELS}),
         "constant_data": record.drop_vars(CHANNELS).drop_attrs(deep=False),
     }
+
+
+def _log_prior(model: ContourModel, draws: Draws) -> xr.Dataset:
+    """Return the logarithm of the prior density of every draw, without the exclusion of contours out of reach."""
+    values = model.log_prior(draws.samples.reshape(-1, len(model.names))).reshape(draws.log_probability.shape)
+    coords = {"chain": np.arange(len(values)), "draw": np.arange(draws.samples.shape[1])}
+    return xr.Dataset({"prior": (_BY_DRAW, values)}, coords=coords)
 
 
 def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
     """Return events of `_KEPT_DRAWS` draws of each chain, and predictions for as many, or as a long record allows."""
     kept = draws.evenly(_KEPT_DRAWS)
     chains, samples = len(draws.samples), len(model.likelihood.measured)
-    affordable = _STORED_NUMBERS // (chains * samples * (len(CHANNELS) + 1))
+    affordable = _STORED_NUMBERS // (chains * samples * 2 * len(CHANNELS))
     fewer = draws.evenly(max(affordable, -(-FEWEST_PREDICTIONS // chains))) if affordable < kept.size else kept
     groups = _predictions(model, draws, fewer, rng)
     if fewer.size < kept.size:
@@ -53,19 +63,18 @@ def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator
 
 
 def _predictions(model: ContourModel, draws: Draws, kept: Index, rng: np.random.Generator) -> dict[str, xr.Dataset]:
-    """Return posterior predictions and log-likelihoods by sample."""
+    """Return posterior predictions by sample, and log-likelihoods by sample and measured channel."""
     points = draws.samples[:, kept].reshape(-1, len(model.names))
     likelihood, cell = model.likelihood, model.likelihood.load_cell
-    samples = len(likelihood.measured)
-    predicted, log_likelihood = np.empty((len(points), samples, len(CHANNELS))), np.empty((len(points), samples))
+    samples, present = len(likelihood.measured), present_channels(model.measured)
+    predicted = np.empty((len(points), samples, len(CHANNELS)))
+    log_likelihood = np.empty((len(points), samples, len(present)))
     smooth: list[Discrepancy] = []
     for block in blocks(len(points), model.loads_of_a_point, _PATHS):
         loads, reached, discrepancy = model.loads_and_discrepancy(points[block])
         error = likelihood.encoder.draw(rng, (block.size, samples))
         predicted[block] = np.take_along_axis(loads, error[:, None, :, None], axis=1)[:, 0]
-        log_likelihood[block] = likelihood.score(
-            loads, reached, model.noise_scale(points[block]), pointwise=True, discrepancy=discrepancy
-        )
+        log_likelihood[block] = likelihood.score_readings(loads, reached, model.noise_scale(points[block]), discrepancy)
         if discrepancy is not None:
             smooth.append(discrepancy)
     discrepancy = joined(smooth)
@@ -76,12 +85,13 @@ def _predictions(model: ContourModel, draws: Draws, kept: Index, rng: np.random.
     coords = {"chain": np.arange(shape[0]), "draw": kept}
     predictive = {}
     for i, (name, unit) in enumerate(zip(CHANNELS, model.likelihood.rod.load_units, strict=True)):
-        if name in present_channels(model.measured):
+        if name in present:
             values = (predicted[..., i] * unit).reshape(shape)
             predictive[name] = (_BY_SAMPLE, values, model.measured[name].attrs)
+    by_reading = ((*_BY_SAMPLE, "channel"), log_likelihood.reshape(*shape, len(present)))
     return {
         "posterior_predictive": xr.Dataset(predictive, coords=coords),
-        "log_likelihood": xr.Dataset({"record": (_BY_SAMPLE, log_likelihood.reshape(shape))}, coords=coords),
+        "log_likelihood": xr.Dataset({"record": by_reading}, coords={**coords, "channel": list(present)}),
     }
 
 
@@ -100,6 +110,13 @@ def _events(model: ContourModel, draws: Draws, kept: Index) -> xr.Dataset:
         variables[name] = (("chain", "draw", "segment"), values, {"units": column.unit_in(units)})
     sides = np.where(model.likelihood.segments.backward, "backward", "forward")
     return xr.Dataset(variables, coords={"chain": np.arange(chains), "draw": kept, "segment": sides})
+
+
+def whole_groups(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
+    """Return all groups of draws."""
+    with threadpool_limits(1):
+        groups = {**drawn_groups(model, draws), **predicted_groups(model, draws, rng)}
+        return {**groups, "prior": prior_draws(model, rng)}
 
 
 def prior_draws(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> xr.Dataset:

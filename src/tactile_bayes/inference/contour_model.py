@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
-from scipy.special import chdtri
+from scipy.special import chdtri, ndtri
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import ContourFamily
-from tactile_bayes.distributions import Distribution, log_density_of, support_of
+from tactile_bayes.distributions import Distribution, log_density_of, quantiles_of, support_of
 from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -273,6 +274,17 @@ class ContourModel:
         if self.unknowns.joint is not None:
             points[:, self._jointly] = self.unknowns.joint.draw(rng, count)
         return points
+
+    @cached_property
+    def _quantiles(self) -> list[Callable[[Floats], Floats]]:
+        return [quantiles_of(self.priors[name], name) for name in self.names]
+
+    def prior_quantiles(self, shares: Floats) -> Floats:
+        """Return the points, (n, d), at which the prior of all contours has these probabilities, one after another."""
+        found = np.stack([at(share) for at, share in zip(self._quantiles, shares.T, strict=True)], axis=1)
+        if self.unknowns.joint is not None:
+            found[:, self._jointly] = self.unknowns.joint.at(ndtri(shares[:, self._jointly]))
+        return found
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
         """Return draws from the prior of contours within reach, (count, d) or fewer, and the share within reach."""

@@ -24,6 +24,7 @@ from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 from tactile_bayes.tasks.documents import read_json
 
 STREAMED = "sequential Monte Carlo"  # sampler of a stream, as the attribute of its posterior states it
+OTHER = "another sampler"  # as the attribute of a result of its draws begins
 # Libraries by which a posterior is computed and stored, besides Python.
 _SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")
 _EVENTS = ("first_contact_x", "snap_off_contact_x", "snap_off_drive_angle")
@@ -247,7 +248,10 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     Returns
     -------
     arviz.InferenceData or xr.DataTree
-        The former for ArviZ 0.23, the latter from 1.0 on.
+        The former for ArviZ 0.23, the latter from 1.0 on. Of a contour, every group has the same draws, those of which
+        predictions are stored, and `observed_data`, `posterior_predictive` and `log_likelihood` have one variable
+        `record` over row and channel, whose units are an attribute: to ArviZ, a sample is a draw. R̂ and effective
+        sample sizes of all draws are those of ``result["posterior"].to_dataset()``, which ArviZ accepts, too.
 
     Raises
     ------
@@ -269,9 +273,27 @@ def to_arviz(posterior: xr.DataTree) -> Any:
         warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 warns of its refactoring
         import arviz
 
+    whole = xr.DataTree.from_dict(_by_reading({n: group.to_dataset() for n, group in posterior.children.items()}))
+    whole.attrs = posterior.attrs
     if int(arviz.__version__.split(".")[0]) >= 1:  # not by hasattr: it has names of former versions, too
-        return posterior
-    return arviz.from_datatree(posterior)
+        return whole
+    return arviz.from_datatree(whole)
+
+
+def _by_reading(groups: dict[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return groups at the draws with a log-likelihood by channel, if there are any, and readings in its layout."""
+    by_reading = groups.get("log_likelihood", xr.Dataset())
+    if "channel" not in by_reading.dims:
+        return groups
+    channels = by_reading["channel"].values.tolist()
+    for name in ("posterior", "sample_stats", "log_prior"):
+        groups[name] = groups[name].sel(draw=by_reading["draw"])
+    for name in ("observed_data", "posterior_predictive"):
+        readings = groups[name][channels]
+        units = [readings[channel].attrs["units"] for channel in channels]
+        record = readings.to_dataarray("channel", "record").transpose(..., "channel")
+        groups[name] = record.assign_attrs(units=", ".join(units)).to_dataset()
+    return {n: group.rename(sample="row") if "sample" in group.dims else group for n, group in groups.items()}
 
 
 def known_of(attrs: Mapping[Any, Any]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tactile_bayes.distributions import UNWRITTEN
-from tactile_bayes.inference.result import is_streamed
+from tactile_bayes.inference.result import OTHER, is_streamed
 from tactile_bayes.tasks.documents import read_json
 
 
@@ -47,6 +47,8 @@ def hindrances(attrs: Mapping[Any, Any]) -> list[str]:
     found = []
     if is_streamed(attrs):
         found.append("The samples came in blocks: taken at once, they give other draws of the same posterior.")
+    elif str(attrs.get("sampler")).startswith(OTHER):
+        found.append(f"The draws are of {attrs['sampler']}: infer_contour gives others of the same posterior.")
     if read_json(attrs["settings"], "settings").get("max_seconds") is not None:
         found.append("The run could end by the clock, after max_seconds: then the number of its steps is not repeated.")
     if "interrupted" in attrs["message"]:

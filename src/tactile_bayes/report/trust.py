@@ -47,9 +47,9 @@ def _convergence(findings: Findings) -> list[str]:
     """Return sentences on the end of the run and on its ensembles."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].to_dataset()
     said = [sentence(f"{attrs['message']}.")]
-    if is_streamed(attrs):
+    chains, rates = stats.sizes["chain"], stats["acceptance_rate"].values
+    if np.isnan(rates).all():  # of a stream, or of another sampler
         return said
-    chains, rates = stats.sizes["chain"], stats["acceptance_rate"].values.tolist()
     return [
         *said,
         f"{chains} independent ensembles of {int(stats.attrs['walkers'])} walkers made {chains * stats.sizes['draw']} "

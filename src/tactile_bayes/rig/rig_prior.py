@@ -95,4 +95,5 @@ def _scores_of(prior: Distribution, x: Floats) -> Floats:
 
 def _at_scores(prior: Distribution, scores: Floats) -> Floats:
     """Return the values with these normal scores."""
-    return np.asarray(prior.ppf(stats.norm.cdf(scores)))  # type: ignore[attr-defined]
+    below, above = prior.ppf(stats.norm.cdf(scores)), prior.isf(stats.norm.sf(scores))  # type: ignore[attr-defined]
+    return np.asarray(np.where(np.asarray(scores < 0.0), below, above))

@@ -26,7 +26,7 @@ from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps, s
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
-from tactile_bayes.record import frame_of, loads_of, rod_of, to_dimensionless, turned
+from tactile_bayes.record import CHANNELS, frame_of, loads_of, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.poses.forward_table import Tables
@@ -259,13 +259,13 @@ class RecordLikelihood:
         """Return the log-likelihood of each contour, shape (n,), or of each sample, (n, samples); −inf out of reach."""
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
-    def _within_blocks(self, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:
+    def _within_blocks(self, measured: Floats, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:
         """Return the log-density of readings within their blocks, for loads of shape (n, samples, 3)."""
         assert self.blocks is not None
         assert isinstance(self.load_cell, AveragedCell)
         of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted))
         deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
-        present = np.asarray(~np.isnan(self.measured).all(axis=0))
+        present = np.asarray(~np.isnan(measured).all(axis=0))
         return self.blocks.log_density_within(deviation, present, pointwise=pointwise)
 
     def score(
@@ -276,14 +276,18 @@ class RecordLikelihood:
         *,
         pointwise: bool = False,
         discrepancy: Discrepancy | None = None,
+        channels: int = len(CHANNELS),
     ) -> Floats:
-        """Return the `log_likelihood` of contours from the loads of `predict_with_errors`, beside a discrepancy."""
+        """Return the `log_likelihood` of the first channels from the loads of `predict_with_errors`."""
+        measured = self.measured
+        if channels < len(CHANNELS):
+            measured = np.where(np.arange(len(CHANNELS)) < channels, measured, np.nan)
         is_exact = self.encoder.count == 1
         scale = np.asarray(noise_scale, dtype=float)
         if scale.ndim > 1 and not is_exact:
             scale = scale[:, None]
         values = self.load_cell.log_likelihood(
-            self.measured,
+            measured,
             predicted[:, 0] if is_exact else predicted,
             noise_scale=scale,
             pointwise=pointwise or not is_exact,
@@ -293,13 +297,24 @@ class RecordLikelihood:
             values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)
             values = values if pointwise else values.sum(axis=-1)
         if self.blocks is not None:
-            values = values + self._within_blocks(predicted[:, 0], scale, pointwise)
+            values = values + self._within_blocks(measured, predicted[:, 0], scale, pointwise)
         values[~reached] = -np.inf
         if np.any(np.isnan(values)):
             raise ParameterError(
                 f"the likelihood of {np.count_nonzero(np.isnan(values))} contours is not a number: please report this"
             )
         return values
+
+    def score_readings(
+        self, predicted: Floats, reached: Flags, noise_scale: Any, discrepancy: Discrepancy | None
+    ) -> Floats:
+        """Return the pointwise `score` of each measured channel given those before it, (n, samples, channels)."""
+        present = np.flatnonzero(~np.isnan(self.measured).all(axis=0))
+        sums = [
+            self.score(predicted, reached, noise_scale, pointwise=True, discrepancy=discrepancy, channels=int(last) + 1)
+            for last in present
+        ]
+        return np.diff(np.stack(sums, axis=-1), prepend=0.0)
 
 
 def events_of(

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_numbers, check_path, check_whole_number
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
+from tactile_bayes.inference.contour_groups import unit_of, whole_groups
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import identity_of
 from tactile_bayes.inference.densities import effective_number, normalised
@@ -243,10 +243,7 @@ class Stream:
             message=f"sequential Monte Carlo, {left:.0f} effective of {len(picked)} particles{fault}",
             stuck=0,
         )
-        with threadpool_limits(1):
-            groups = {**drawn_groups(model, draws), **predicted_groups(model, draws, random)}
-            groups["prior"] = prior_draws(model, random)
-        tree = xr.DataTree.from_dict(groups)
+        tree = xr.DataTree.from_dict(whole_groups(model, draws, random))
         about = provenance(draws, seed=self._seed, settings=SamplerSettings(), **state.experiment.about)
         tree.attrs = {**about, "sampler": STREAMED, "settings": f'{{"particles": {len(picked)}}}'}
         return tree
