@@ -22,6 +22,7 @@ from tactile_bayes.rig.parameters import GROUPS
 
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
 FRONT = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "VISION", "SECURITY", "CODE_OF_CONDUCT")]
+FRONT += [ROOT / "benchmarks" / "challenge" / "README.md"]
 TEXTS = {path: path.read_text(encoding="utf-8") for path in [*PAGES, *FRONT]}
 LINK = re.compile(r"\]\((?!https?:)(?P<target>[^)#\s]*)(?:#(?P<anchor>[^)\s]+))?\)")
 
