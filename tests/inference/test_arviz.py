@@ -181,7 +181,7 @@ ARVIZ_STATS: Uses = {
     "weight_predictions": lambda st, tree: st.weight_predictions([tree, tree]),
 }
 ARVIZ_PLOTS: Uses = {
-    "add_bands": lambda ap, tree: ap.add_bands(ap.plot_dist(tree), values={"q": (0.0, middle(tree))}),
+    "add_bands": lambda ap, tree: ap.add_bands(ap.plot_dist(tree), values={"q": [(0.0, middle(tree))]}),
     "add_lines": lambda ap, tree: ap.add_lines(ap.plot_dist(tree), values={"q": middle(tree)}),
     "combine_plots": lambda ap, tree: ap.combine_plots(tree, plots=[(ap.plot_trace, {}), (ap.plot_rank, {})]),
     **{
@@ -225,7 +225,8 @@ def installed(name: str) -> Any:
 def functions(found: Any) -> set[str]:
     """Statistics and plots of a library."""
     if found.__name__ == "arviz_plots":
-        return {name for name in dir(found) if name.startswith(("plot_", "add_", "combine_"))} - {"plot_collection"}
+        kinds = ("plot_", "add_", "combine_")
+        return {name for name in dir(found) if name.startswith(kinds) and callable(getattr(found, name))}
     listed = dir(found) if found.__name__ == "arviz_stats" else [*found.stats.__all__, *found.plots.__all__]
     return {name for name in listed if callable(getattr(found, name)) and not name[0].isupper() and name[0] != "_"}
 

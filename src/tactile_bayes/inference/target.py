@@ -312,7 +312,7 @@ def result(
     >>> measured = rig.load_cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
     >>> draws = np.random.default_rng(1).normal([0.5, 0.5, 0.0, 1.0], 1e-3, (4, 200, 4))
     >>> tree = result(target(measured, rig=rig), draws, rng=1, sampler="a guess")
-    >>> tree.attrs["converged"], contour_band(tree, [0.0]).median.values.round(2)
+    >>> tree.attrs["converged"], contour_band(tree, [0.0])["median"].values.round(2)
     (0, array([0.5]))
     """
     check_kind("target", target, Target, "give the result of tactile_bayes.target")
