@@ -230,7 +230,7 @@ def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
     try:
         result = read_netcdf(path, xr.open_datatree, lambda what: InferenceError(f"{path} {what}: infer again"))
     except FileNotFoundError:
-        raise InferenceError(f"there is no file {path}") from None
+        raise InferenceError(f"there is no file {path}: give that of a result") from None
     except OSError as error:
         raise InferenceError(f"{path} cannot be opened ({error.strerror}): give the file of a posterior") from error
     _posterior_group(result)
