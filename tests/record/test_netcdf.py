@@ -64,6 +64,22 @@ def test_a_file_that_another_program_writes_or_changes_is_read(tmp_path):
     assert read_record(tmp_path / "a.nc").equals(make_record(edited("force_y", 1, 0.625)))
 
 
+@pytest.mark.parametrize(("name", "error"), [("record_format", RecordError), ("result_format", InferenceError)])
+def test_a_file_states_its_format_and_a_newer_one_is_refused(tmp_path, name, error):
+    path, record = tmp_path / "a.nc", make_record(columns())
+    write_record(record, path)
+    assert read_netcdf(path, xr.open_dataset, ValueError).attrs["record_format"] == 1
+    assert "record_format" not in read_record(path).attrs
+    write_netcdf(record.assign_attrs({name: 2}), path)
+    with refused(error, path, "format 2", "format 1"):
+        (read_record if error is RecordError else read_result)(path)
+
+
+def test_the_name_of_the_format_is_no_attribute_of_a_record():
+    with refused(RecordError, "record_format"):
+        make_record(columns(), attrs={"record_format": 1})
+
+
 def sealed(path):
     """Give a file the last line that a file of our own has."""
     content = path.read_bytes()

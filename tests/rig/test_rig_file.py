@@ -266,6 +266,15 @@ def test_a_rig_without_a_rod_in_metres_has_no_units(tmp_path):
             read(tmp_path / "rig.toml", text)
 
 
+def test_a_file_states_its_format_and_one_that_states_none_has_the_first(tmp_path):
+    rig = Rig(unknown={"friction": 0.2})
+    rig.write(tmp_path / "rig.toml")
+    text = (tmp_path / "rig.toml").read_text(encoding="utf-8")
+    assert text.count("\nformat = 1\n") == 1
+    for said in (text, text.replace("format = 1\n", "")):
+        assert read(tmp_path / "rig.toml", said).tables == rig.tables
+
+
 def calibrated(parameters, correlation):
     stated = 'source = "0"\nerror = 0.01\nstated = {}'
     return f"[calibration]\n{stated}\nparameters = {parameters}\ncorrelation = {correlation}"
@@ -273,6 +282,8 @@ def calibrated(parameters, correlation):
 
 TWO = "{ lever_x = { normal = [0.0, 0.1] }, lever_y = { normal = [0.0, 0.1] } }"
 WRONG = {
+    "a newer format": ("format = 2\n[road]", "format 2"),
+    "no format": ('format = "1"', "format '1'"),
     "no table": ("[road]", "did you mean 'rod'"),
     "no parameter": ("[unknown]\nfrictoin = 0.1", "did you mean 'friction'"),
     "no entry": ("[rod]\nlenght = 0.1", "did you mean 'length'"),

@@ -7,9 +7,11 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tactile_bayes.tasks import alone_in, files, is_temporary, write_atomically
+from helpers.refusals import refused
+from tactile_bayes.tasks import alone_in, check_format, files, is_temporary, write_atomically
 
 CHILD = """
 import sys, time
@@ -119,3 +121,42 @@ def test_many_write_into_one_folder_at_once(tmp_path):
         thread.join()
     assert not failures
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"{number}.txt" for number in range(8)]
+
+
+@pytest.mark.parametrize(
+    ("platform", "times", "is_there"), [("win32", 3, True), ("win32", 99, False), ("linux", 1, False)]
+)
+def test_a_file_that_another_program_keeps_open_is_replaced_a_little_later_on_windows(
+    tmp_path, monkeypatch, platform, times, is_there
+):
+    refusals, replace = iter(range(times)), os.replace
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+
+    def kept_open(*paths):
+        if next(refusals, None) is None:
+            return replace(*paths)
+        raise PermissionError(13, "in use by another process", str(paths[0]))
+
+    monkeypatch.setattr(os, "replace", kept_open)
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setattr(time, "sleep", lambda seconds: None)
+    if is_there:
+        written(target)
+    else:
+        with pytest.raises(PermissionError) as refusal:
+            written(target)
+        assert refusal.value.filename == str(target)
+    assert target.read_text() == ("new" if is_there else "old")
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("stated", [2, 3.0, np.int64(3), None])
+def test_a_format_that_is_read_is_accepted_and_that_of_a_file_without_is_the_first(stated):
+    check_format(stated, 3, ValueError, oldest=1 if stated is None else 2)
+
+
+@pytest.mark.parametrize("stated", [4, 1, 0, -1, 2.5, float("inf"), float("nan"), True, "2", [2], np.ones(1), None])
+def test_another_format_is_refused_with_what_is_read(stated):
+    with refused(ValueError, "formats 2 to 3"):
+        check_format(stated, 3, ValueError, oldest=2)

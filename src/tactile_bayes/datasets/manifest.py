@@ -17,7 +17,7 @@ from tactile_bayes.datasets.shard import Written, file_in, shard_file
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.tasks import write_atomically
+from tactile_bayes.tasks import check_format, write_atomically
 from tactile_bayes.tasks.documents import read_json
 
 MANIFEST = "manifest.json"
@@ -105,11 +105,8 @@ def read_manifest(folder: Path) -> Manifest:
         table.pop("sha256")
         if content != _content(table):
             raise SpecificationError(f"{path} is not as it was written, its own checksum differs: {_CORRECTION}")
-        if table["format"] != _FORMAT:
-            raise SpecificationError(
-                f"{path} has format {table['format']}, and this version reads format {_FORMAT}: take the version that "
-                "it was made with, or make it again in another folder"
-            )
+        again = "or make it again in another folder"
+        check_format(table["format"], _FORMAT, lambda what: SpecificationError(f"{path} {what}: {again}"), _FORMAT)
         shards = tuple(Written(**shard) for shard in table["shards"])
         rest = {name: table[name] for name in Manifest.__dataclass_fields__ if name != "shards"}
         manifest = Manifest(**rest, shards=shards)

@@ -20,7 +20,7 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, seed_words
-from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
+from tactile_bayes.record.netcdf import RESULT_FORMAT, read_netcdf, write_netcdf
 from tactile_bayes.tasks.documents import read_json
 
 STREAMED = "sequential Monte Carlo"  # sampler of a stream, as the attribute of its posterior states it
@@ -60,8 +60,7 @@ def sample_stats(draws: Draws) -> xr.Dataset:
 def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha256: str, **more: Any) -> dict[str, Any]:
     """Return attributes of a result: software, seed, settings, hash of the data, convergence and message."""
     return {
-        "inference_library": "tactile-bayes",
-        "inference_library_version": version("tactile-bayes"),
+        **library(),
         "sampler": f"emcee {version('emcee')}",
         "versions": _versions(),
         "seed": seed_words(seed),
@@ -70,6 +69,15 @@ def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha2
         "converged": int(draws.converged),
         "message": draws.message,
         **more,
+    }
+
+
+def library() -> dict[str, Any]:
+    """Return the attributes of a result that state by which software it is, and its format."""
+    return {
+        "inference_library": "tactile-bayes",
+        "inference_library_version": version("tactile-bayes"),
+        **RESULT_FORMAT,
     }
 
 
@@ -225,6 +233,16 @@ def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
     ------
     InferenceError
         If there is no such file, or it holds no posterior or is damaged.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> draws = xr.Dataset({"q": (("chain", "draw"), np.full((4, 100), 0.5))})
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     write_result(xr.DataTree.from_dict({"posterior": draws}), Path(directory) / "posterior.nc")
+    ...     float(read_result(Path(directory) / "posterior.nc")["posterior"]["q"].mean())
+    0.5
     """
     path = check_path("path", path)
     try:

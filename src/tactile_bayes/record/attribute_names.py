@@ -32,6 +32,8 @@ def misspelt(name: str, value: Any) -> str | None:
     """Return why an attribute, a number named `rod_…` or `load_cell_…` or a name like a known one, may be misspelt."""
     if name in USED:
         return None
+    if name == "record_format":
+        return "this name is that of the format of its file: give it another"
     prefix = next((prefix for prefix in _PREFIXES if name.startswith(prefix)), None)
     if prefix is not None and (_is_quantity(value) or _likely(name, prefix)):
         return no_entry(name.removeprefix(prefix), prefix)

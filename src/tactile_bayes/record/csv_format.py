@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tactile_bayes.record.csv_end import without_cut_row
 from tactile_bayes.record.csv_header import (
-    FORMAT,
     KINDS,
     Header,
     cells_in,
@@ -30,7 +29,7 @@ from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, or
 from tactile_bayes.record.parsing import number_with_comma
 from tactile_bayes.record.quantity import Unit, unit_of, units_disagree
 from tactile_bayes.record.rig_entry import file_entry
-from tactile_bayes.record.schema import MEASURED, Kind
+from tactile_bayes.record.schema import MEASURED, RECORD_FORMAT, Kind
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
 
@@ -43,7 +42,7 @@ def write_csv(record: xr.Dataset, path: Path) -> None:
     columns = {str(name): variable for name, variable in record.variables.items()}
     columns = {name: columns[name] for name in sorted(columns, key=lambda name: name not in MEASURED)}
     with write_atomically(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
-        file.write(f"# tactile_bayes record, format {FORMAT}\n")
+        file.write(f"# tactile_bayes record, format {RECORD_FORMAT}\n")
         for name, value in record.attrs.items():
             file.write(header_line(name, value, record.attrs["units"]))
         for name, variable in columns.items():

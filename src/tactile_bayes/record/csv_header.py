@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import Any, BinaryIO
 
@@ -15,12 +17,12 @@ from tactile_bayes.record.attribute_names import stray_attribute
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
 from tactile_bayes.record.parsing import integer_in, is_integer_text, number_in
 from tactile_bayes.record.quantity import accepted_units, converted, same_quantity
-from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED, RECORD_FORMAT
 from tactile_bayes.record.spelling import visible
 from tactile_bayes.record.table import Source
+from tactile_bayes.tasks import check_format
 from tactile_bayes.tasks.documents import read_json
 
-FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
 _DELIMITERS = ",;\t"
 _SEARCHED, _LONGEST = 50, 100_000  # number of lines, and of bytes of each, that are inspected ahead of reading
@@ -115,10 +117,7 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             continue
         content = _unpadded(line[1:])
         if match := _FORMAT_LINE.fullmatch(content):
-            found = integer_in(match["format"])
-            if found is None or found > FORMAT:
-                what = f"the file has format {match['format']}, but this version of tactile_bayes reads formats up to "
-                raise source.line_error(number, f"{what}{FORMAT}: update it")
+            check_format(integer_in(match["format"]) or math.inf, RECORD_FORMAT, partial(source.line_error, number))
         elif match := _COLUMN_LINE.fullmatch(content):
             if match["kind"] not in KINDS.values():
                 what = f"{match['kind']!r} is no kind of column: write integer, number or text"

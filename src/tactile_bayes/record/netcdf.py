@@ -20,13 +20,18 @@ from xarray.backends import H5NetCDFStore, InMemoryDataStore
 
 from tactile_bayes.record import netcdf_content
 from tactile_bayes.record.netcdf_content import FileGroup, UnsafeError, content_of, is_cut_short, received, time_limit
+from tactile_bayes.record.schema import RECORD_FORMAT
 from tactile_bayes.record.table import Source, Table, table_of
-from tactile_bayes.tasks import write_atomically
+from tactile_bayes.tasks import check_format, write_atomically
 
 Content = TypeVar("Content", xr.Dataset, xr.DataTree)
 
 _SEAL = b"\ntactile_bayes: SHA-256 of all bytes before this line "
 _SEAL_BYTES = len(_SEAL) + 64 + 1
+
+# Newest formats that are read, by the attribute that states them.
+RESULT_FORMAT = {"result_format": 1}
+_FORMATS = {"record_format": RECORD_FORMAT, **RESULT_FORMAT}
 
 _SUPERBLOCK = 48  # number of first bytes of an HDF5 file that contain the number of all its bytes
 
@@ -92,6 +97,8 @@ def read_netcdf(
         groups = content_of(content, with_groups) if is_known else _content_elsewhere(content, with_groups)
         found = {name: _dataset(group, options) for name, group in groups.items()}
         result: Any = xr.DataTree.from_dict(found) if with_groups else found["/"]
+    for name, reads in _FORMATS.items():
+        check_format(result.attrs.get(name), reads, refused)
     return result
 
 
@@ -178,6 +185,7 @@ def read_netcdf_table(path: Path, columns: Mapping[str, str]) -> Table:
         decode_timedelta=False,
         decode_coords=False,
     )
+    record.attrs.pop("record_format", None)
     dimensions = {variable.dims for variable in record.variables.values()}
     shared = dimensions.pop() if len(dimensions) == 1 else ()
     return table_of(record, source, shared[0] if len(shared) == 1 else "sample")
@@ -197,4 +205,4 @@ def write_netcdf_record(record: xr.Dataset, path: Path) -> None:
             encoding[name] = {"dtype": "S1", "char_dim_name": dimension}
         elif variable.dtype.kind != "O":  # objects are texts of different lengths
             encoding[name] = {"_FillValue": None}
-    write_netcdf(record, path, encoding)
+    write_netcdf(record.assign_attrs(record_format=RECORD_FORMAT), path, encoding)

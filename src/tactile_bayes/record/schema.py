@@ -71,6 +71,7 @@ DIRECTIONS = ("forward", "backward")  # senses of the drive: increasing and decr
 # Values of the attribute `load_cell_frame` of a record: force_x and force_y along the axes x and y of the laboratory,
 # or along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0).
 FRAMES: tuple[Frame, Frame] = ("fixed", "turning")
+RECORD_FORMAT = 1  # that of the files of a record
 UNITS = ("SI", "dimensionless")  # values of the attribute `units` of a record
 _GAIN_UNITS = {("N", "N m"): "1/m", ("N m", "N"): "m"}
 

@@ -27,7 +27,7 @@ from tactile_bayes.rig.file_format import OPTIONS, FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import NOTHING
-from tactile_bayes.tasks import write_atomically
+from tactile_bayes.tasks import check_format, write_atomically
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
 ROD_UNITS = {
@@ -52,12 +52,14 @@ _ONE_OF_BOTH = "[rod] states youngs_modulus: give the diameter beside it, and le
 _OF_SHAPE = ("rest_curvature", "rest_curvature_deviation", "rest_shape_modes", "taper_deviation")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
+_FORMAT = 1
 _LARGEST = 1 << 20  # largest number of characters of a file
-_HEAD = """\
+_HEAD = f"""\
 # A rig, for the option --rig of tactile-bayes and for tactile_bayes.Rig.read: what its data sheets state, how its files
 # are written, and what is unknown. A number is known, a distribution is unknown; `tactile-bayes rig --parameters` lists
 # what may be unknown. Numbers are in SI units, or texts with a unit, like "200 mm", if [rod] states a length and a
 # flexural rigidity; else they are in units of the rod: lengths in L, moments in EI/L, forces in EI/L².
+format = {_FORMAT}
 """
 
 
@@ -67,7 +69,9 @@ def read_tables(path: Path) -> dict[str, Any]:
         text = file.read(_LARGEST + 1)
     if len(text) > _LARGEST:
         raise ParameterError(f"it has more than {_LARGEST} characters, and is no file of a rig")
-    return read_toml(text)
+    tables = read_toml(text)
+    check_format(tables.pop("format", None), _FORMAT, lambda what: ParameterError(f"it {what}"))
+    return tables
 
 
 @contextmanager

@@ -15,7 +15,7 @@ import xarray as xr
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.plotting.style import own_style, save_figure
-from tactile_bayes.record.netcdf import write_netcdf
+from tactile_bayes.record.netcdf import RESULT_FORMAT, write_netcdf
 from tactile_bayes.tasks import errors_of, replace_together
 
 Result = TypeVar("Result")
@@ -79,6 +79,8 @@ class Folder:
 
     def write_netcdf(self, what: str, name: str, content: xr.Dataset | xr.DataTree) -> None:
         """Write a dataset or a tree as NetCDF, with checksums."""
+        content = content.copy(deep=False)
+        content.attrs |= RESULT_FORMAT
         with self.file(what, name) as temporary:
             write_netcdf(content, temporary)
 

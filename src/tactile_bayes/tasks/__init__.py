@@ -2,6 +2,7 @@
 
 from tactile_bayes.tasks.files import (
     alone_in,
+    check_format,
     errors_of,
     is_temporary,
     refuse_replacing,
@@ -26,6 +27,7 @@ __all__ = [
     "TaskProgress",
     "Workers",
     "alone_in",
+    "check_format",
     "errors_of",
     "in_parts",
     "is_temporary",

@@ -9,17 +9,20 @@ import platform
 import re
 import secrets
 import shutil
+import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError
 
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 _TEMPORARY = re.compile(r"\.tactile-bayes-(?P<host>[0-9a-f]{8})-[0-9a-f]{16}\.tmp")
 _DAY = 86_400.0
+_TRIES = 20
 
 
 @contextmanager
@@ -33,7 +36,7 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary = folder / target.name
         yield temporary
         _flush(temporary)
-        os.replace(temporary, target)
+        _move(temporary, target)
         _flush(target.parent)
 
 
@@ -66,12 +69,22 @@ def _exchange(folder: Path, temporary: Path, names: Sequence[str], new: Sequence
     moved = list[tuple[Path, Path]]()
     try:
         for source, target in [*away, *((temporary / name, folder / name) for name in reversed(new))]:
-            os.replace(source, target)
+            _move(source, target)
             moved.append((source, target))
     except BaseException:
         for source, target in reversed(moved):
-            os.replace(target, source)
+            _move(target, source)
         raise
+
+
+def _move(source: Path, target: Path) -> None:
+    """Move a file; on Windows again for a second, as other programs that look at new files keep them for a moment."""
+    for _ in range(_TRIES if sys.platform == "win32" else 0):
+        with suppress(PermissionError):
+            os.replace(source, target)
+            return
+        time.sleep(1.0 / _TRIES)
+    os.replace(source, target)
 
 
 def refuse_replacing(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
@@ -90,6 +103,16 @@ def _is_same(path: Path, other: Path) -> bool:
         return path.samefile(other)
     except OSError:  # one of them is not there yet
         return path.resolve() == other.resolve()
+
+
+def check_format(stated: object, reads: int, refused: Callable[[str], Exception], oldest: int = 1) -> None:
+    """Raise `refused(what)` unless a file states a format from `oldest` to `reads`; that of one without is 1."""
+    found = 1.0 if stated is None else as_number(stated)
+    if found is None or not (oldest <= found <= reads and found.is_integer()):
+        number = shown(stated) if found is None else f"{found:g}"
+        formats = f"format {reads}" if oldest == reads else f"formats {oldest} to {reads}"
+        correction = "use the one that wrote it" if found is not None and found < oldest else "install a newer one"
+        raise refused(f"has format {number}, and this version of tactile_bayes reads {formats} ({correction})")
 
 
 def is_temporary(path: Path) -> bool:

@@ -15,7 +15,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from tactile_bayes.checks import check_path
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.tasks.documents import json_value, read_json
-from tactile_bayes.tasks.files import alone_in, write_atomically
+from tactile_bayes.tasks.files import alone_in, check_format, write_atomically
 from tactile_bayes.tasks.workers import TaskProgress, Workers, run_tasks, workers_of
 
 Task = TypeVar("Task")
@@ -119,8 +119,7 @@ def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]
     correction = f"give another folder, or remove {file.name} from it to start again"
     try:
         table = read_json(file.read_bytes(), "it")
-        if table["format"] != _FORMAT:
-            raise kind.error(f"{file} has format {table['format']}, this version reads {_FORMAT}: {correction}")
+        check_format(table["format"], _FORMAT, lambda what: kind.error(f"{file} {what}: or {correction}"))
         there = dict(table["experiment"])
         outcomes = {int(row["number"]): kind.decode(row) for row in table[kind.what]}
     except kind.error:

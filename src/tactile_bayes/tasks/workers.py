@@ -27,11 +27,19 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _PATIENCE = "10s"  # timeout of the connection to a scheduler
+_MOST = 60  # largest number of processes: Windows can wait for 63 things at once
 _RETRIES = 3  # number of retries of a task after its process died
 
 
 class TaskProgress(NamedTuple):
-    """Progress of many tasks."""
+    """Progress of many tasks.
+
+    Examples
+    --------
+    >>> progress = TaskProgress(done=30, wanted=100, made=10, seconds=5.0)
+    >>> progress.seconds / progress.made * (progress.wanted - progress.done)  # time that is left [s]
+    35.0
+    """
 
     done: int
     wanted: int
@@ -93,7 +101,7 @@ def run_tasks(
     if isinstance(where, str):
         yield from _on_cluster(function, tasks, where)
         return
-    count = min(where or cores(), len(tasks))
+    count = min(where or cores(), len(tasks), _MOST)
     if count <= 1:
         for task in tasks:
             yield task, _alone(function, task)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
-
 import numpy as np
 import xarray as xr
 
@@ -15,7 +13,7 @@ from tactile_bayes.inference.contact_posterior.posterior import groups_of_contac
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
+from tactile_bayes.inference.result import contour_draws, library, posterior_draws, record_of
 from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
@@ -86,8 +84,7 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     coords = {"chain": picked["chain"].values, "draw": picked["draw"].values, "sample": np.arange(touched.size)}
     tree = xr.DataTree.from_dict(groups_of_contacts(variables, coords, stats, record))
     tree.attrs = {
-        "inference_library": "tactile-bayes",
-        "inference_library_version": version("tactile-bayes"),
+        **library(),
         **{name: posterior.attrs[name] for name in _OF_RUN + _OF_MODEL if name in posterior.attrs},
         "draws": number,
         "dependence": "a draw is one contour, and its contacts at all samples lie on it",

@@ -17,7 +17,8 @@ from tactile_bayes.inference.contour_evidence import contour_evidence
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.streams import particles
-from tactile_bayes.inference.streams.stream_state import surprise_after
+from tactile_bayes.inference.streams.stream_state import read_tree, surprise_after
+from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig import Rig
 
 STATED = Rig(load_cell=CELL, unknown="nothing")
@@ -251,6 +252,11 @@ def test_a_file_that_is_damaged_or_no_state_is_refused(measured, saved, tmp_path
             tb.Stream.resume(where, **SAVED)
     tb.write_record(measured, path)
     with refused(InferenceError, "holds no state of a stream"):
+        tb.Stream.resume(path, **SAVED)
+    newer = read_tree(saved[0])
+    newer.attrs["format"] = 3
+    write_netcdf(newer, path)
+    with refused(InferenceError, path, "format 3"):
         tb.Stream.resume(path, **SAVED)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from tactile_bayes.inference.contact_posterior.draws import CHAINS, LEAST_DRAWS,
 from tactile_bayes.inference.importance import LARGEST_K
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
+from tactile_bayes.inference.result import library
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, spawn
@@ -157,8 +157,7 @@ def infer_contacts(
     if cell.degrees_of_freedom > 2.0:
         chance = float(contacts_of(Corrected(measured, cell, friction), "constrained").attrs["misfit_probability"])
     tree.attrs = {
-        "inference_library": "tactile-bayes",
-        "inference_library_version": version("tactile-bayes"),
+        **library(),
         "sampler": "importance sampling",
         "seed": seed_words(seed),
         "data_sha256": record_hash(measured),

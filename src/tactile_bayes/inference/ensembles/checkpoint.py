@@ -21,7 +21,7 @@ from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, StoredSteps
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, whole_seed
-from tactile_bayes.tasks import alone_in, is_temporary, versions_of, write_atomically
+from tactile_bayes.tasks import alone_in, check_format, is_temporary, versions_of, write_atomically
 from tactile_bayes.tasks.documents import read_json
 
 _START = "starting points"  # they follow from the other entries
@@ -134,11 +134,8 @@ class Checkpoint:
         table = read_json(text, "its description")
         if table["kind"] != _KIND:
             raise ValueError(f"it is of kind {table['kind']!r}")
-        if (number := int(table["format"])) != _FORMAT:
-            raise InferenceError(
-                f"{self._path} has format {number}, and this version reads format {_FORMAT}: use the version that "
-                "began it, or give another folder"
-            )
+        other = "or give another folder"
+        check_format(table["format"], _FORMAT, lambda what: InferenceError(f"{self._path} {what}: {other}"), _FORMAT)
         if found := changes({name: str(value) for name, value in table["identity"].items()}, self._identity):
             raise InferenceError(
                 f"{self._path.parent} is the checkpoint of another run, which differs in {'; '.join(found)}: give "

@@ -17,6 +17,7 @@ from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import read_netcdf
+from tactile_bayes.tasks import check_format
 from tactile_bayes.tasks.documents import read_json
 
 WIDER = (1.5, 3.0, 6.0)  # factors on the noise of the alternatives with which the e-value compares the model
@@ -95,11 +96,8 @@ def state_in(tree: xr.DataTree, path: Path) -> tuple[xr.Dataset, dict[str, str],
     """Return record, identity, and all else of the state in a tree from `tree_of`, or of a part of the file."""
     if tree.attrs.get("kind") != _KIND:
         raise InferenceError(f"{path} holds no state of a stream: give a file that Stream.save has written")
-    if tree.attrs["format"] != _FORMAT:
-        raise InferenceError(
-            f"{path} has format {tree.attrs['format']}, and this version reads format {_FORMAT}: use the "
-            "version that wrote it, or begin a new stream"
-        )
+    stated = tree.attrs.get("format")
+    check_format(stated, _FORMAT, lambda what: InferenceError(f"{path} {what}: or begin a new stream"), _FORMAT)
     try:
         record = validate(tree["record"].to_dataset())
         identity = {name: str(value) for name, value in read_json(tree.attrs["identity"], "identity").items()}
