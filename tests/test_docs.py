@@ -1,5 +1,6 @@
 """The documentation: its code runs and prints what it says, and it names what there is."""
 
+import inspect
 import json
 import re
 import subprocess
@@ -15,13 +16,13 @@ from benchmarks.calibration import FAMILIES, STICKING, TRACED, Family, published
 import tactile_bayes as tb
 from helpers.commands import call
 from helpers.pages import DOCS, ROOT, agree, blocks, commands, matter, run
-from helpers.public_names import left_out, listed
+from helpers.public_names import left_out, listed, public
 from tactile_bayes.cli import app
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS
 from tactile_bayes.rig.parameters import GROUPS
 
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
-FRONT = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "VISION", "SECURITY", "CODE_OF_CONDUCT")]
+FRONT = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "VISION", "SECURITY", "SUPPORT", "CODE_OF_CONDUCT")]
 FRONT += [ROOT / "benchmarks" / "challenge" / "README.md"]
 TEXTS = {path: path.read_text(encoding="utf-8") for path in [*PAGES, *FRONT]}
 LINK = re.compile(r"\]\((?!https?:)(?P<target>[^)#\s]*)(?:#(?P<anchor>[^)\s]+))?\)")
@@ -110,6 +111,11 @@ def test_every_public_name_is_in_the_api_and_there_are_at_most_forty() -> None:
     assert all(hasattr(module, name) for module, names in listed() for name in names)
 
 
+def test_every_public_name_has_an_example() -> None:
+    given = {called: getattr(module, name) for module, name, called in public() if not name.isupper()}
+    assert [name for name, each in given.items() if ">>>" not in (inspect.getdoc(each) or "")] == []
+
+
 def test_the_columns_and_the_data_sheet_are_specified() -> None:
     page = TEXTS[DOCS / "formats.md"]
     assert [name for name in COLUMNS if f"`{name}`" not in page and f"`truth_{name}`" not in page] == []
@@ -179,6 +185,16 @@ def test_readme_shows_rows_of_tables_in_the_docs() -> None:
     assert len(ratios) == 5
     assert all(line in TEXTS[DOCS / "trust.md"] for line in calibrations)
     assert all(line in TEXTS[DOCS / "comparisons.md"] for line in ratios)
+
+
+def test_the_paper_cites_what_its_list_has_and_is_of_the_length_that_the_journal_takes() -> None:
+    text, listed = ((ROOT / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
+    _, head, body = text.split("---\n", 2)
+    assert "bibliography: paper.bib" in head
+    keys = re.findall(r"^@\w+\{(\w+),", listed, flags=re.MULTILINE)
+    assert sorted(keys) == sorted(set(re.findall(r"@(\w+)", body)))
+    assert len(re.findall(r"^  doi +=", listed, flags=re.MULTILINE)) == len(keys)
+    assert 750 <= len(body.split()) <= 1750
 
 
 def test_every_notebook_is_named() -> None:

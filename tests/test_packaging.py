@@ -4,13 +4,21 @@ import email
 import subprocess
 import sys
 import tarfile
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
+from packaging.requirements import Requirement
+
+import tactile_bayes as tb
 
 ROOT = Path(__file__).parents[1]
+
+CITATION, RECIPE = "CITATION.cff", "recipe/recipe.yaml"
+ELSEWHERE = {"matplotlib": "matplotlib-base"}  # names that the recipe's packages have there
 
 OPTIONAL = ("matplotlib", "distributed", "dask", "jinja2", "arviz", "emcee", "rich", "sklearn")
 
@@ -66,6 +74,28 @@ def test_the_metadata_says_what_it_is(built):
     assert metadata["Requires-Python"] == ">=3.11"
     assert metadata["License-Expression"] == "MIT"
     assert {"cluster", "notebooks"} <= set(metadata.get_all("Provides-Extra"))
+
+
+def test_all_files_that_state_the_version_state_the_same():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    cited, recipe = (yaml.safe_load((ROOT / name).read_text(encoding="utf-8")) for name in (CITATION, RECIPE))
+    heading = f"## [{tb.__version__}]"
+    assert project["version"] == cited["version"] == recipe["context"]["version"] == tb.__version__
+    assert heading in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_recipe_requires_what_the_package_requires():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    recipe = yaml.safe_load((ROOT / RECIPE).read_text(encoding="utf-8"))["requirements"]
+
+    def named(requirements):
+        return {ELSEWHERE.get(each.name, each.name): str(each.specifier) for each in map(Requirement, requirements)}
+
+    wanted = named(project["project"]["dependencies"]) | {"xarray-einstats": ""}  # of the extra of arviz-stats
+    (python, *run), (_, pip, *host) = recipe["run"], recipe["host"]
+    assert (python, pip) == ("python >=${{ python_min }}", "pip")
+    assert named(run) == wanted
+    assert named(host) == named(project["build-system"]["requires"])
 
 
 def test_it_starts_without_what_is_loaded_when_used():

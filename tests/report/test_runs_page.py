@@ -42,6 +42,10 @@ def points(tmp_path_factory):
     return path
 
 
+def refuse(*_):
+    raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+
 def page_of(path):
     return Page(path.read_text(encoding="utf-8"))
 
@@ -65,6 +69,9 @@ def test_runs_are_side_by_side_and_what_fails_has_its_reason(runs):
     assert [attrs["href"] for attrs in page.all("a")] == ["one", "t%3Cwo"]
     write_report(runs / "one")
     assert page_of(write_report(runs)).all("a")[0]["href"] == "one/report.html"
+    with pytest.MonkeyPatch.context() as patch:  # between drives of Windows no way leads
+        patch.setattr("os.path.relpath", refuse)
+        assert page_of(write_report(runs)).all("a")[0]["href"] == (runs / "one" / "report.html").resolve().as_uri()
     (runs / "one" / "report.html").unlink()
 
 

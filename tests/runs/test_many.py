@@ -114,6 +114,11 @@ def test_a_later_call_adds_to_the_table_and_renames_nothing(made, records, tmp_p
     assert seen == [f"{records.name}-one"]
 
 
+def test_folders_differ_also_where_letters_of_both_cases_are_the_same(tmp_path):
+    names = many._names([tmp_path / "x" / "One.csv", tmp_path / "y" / "one.csv"], tmp_path)
+    assert names == ["x-One", "y-one"]
+
+
 def test_what_cannot_be_is_refused(records, tmp_path):
     one, empty, spoilt = records / "one.csv", tmp_path / "empty", tmp_path / "spoilt"
     for folder in (empty, spoilt):

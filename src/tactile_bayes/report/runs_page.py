@@ -193,4 +193,8 @@ def _address(folder: Path, out: Path) -> str:
     """Return the address of the run's own page, or else of its folder, from the page of several."""
     page = folder / "report.html"
     target = page if page.is_file() and page.resolve() != out.resolve() else folder
-    return quote(Path(os.path.relpath(target.resolve(), out.resolve().parent)).as_posix())
+    try:
+        way = os.path.relpath(target.resolve(), out.resolve().parent)
+    except ValueError:  # on another drive of Windows
+        return target.resolve().as_uri()
+    return quote(Path(way).as_posix())

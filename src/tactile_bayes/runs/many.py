@@ -123,6 +123,21 @@ def infer_contours(
         run of one of the records that was made with another rig, family, seed, settings, probability or version.
     TaskError
         As in `run_tasks`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tactile_bayes import LoadCell, scan, write_record
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+    >>> settings = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path, out = Path(folder) / "one.csv", Path(folder) / "runs"
+    ...     write_record(measured, path)
+    ...     table = infer_contours([path], Rig(unknown="nothing"), out=out, rng=1, settings=settings, figures=False)
+    >>> table["record"].values.tolist(), table["error"].item()
+    (['one'], '')
     """
     paths, folder = records_in(records), check_path("out", out, "give the path of a folder")
     check_probability("probability", probability)
@@ -173,14 +188,15 @@ def records_in(records: str | os.PathLike[str] | Iterable[str | os.PathLike[str]
 
 def _names(paths: Sequence[Path], folder: Path) -> list[str]:
     """Return a name for each record: that of its run in the folder, or a free one."""
-    stems, names = Counter(path.stem for path in paths), list[str]()
+    stems, names = Counter(path.stem.casefold() for path in paths), list[str]()  # some systems do not tell A from a
     for path in paths:
         record = _digest(path) if path.exists() else ""
         own = [path.stem, f"{path.resolve().parent.name}-{path.stem}"]
         stored = [_stored(folder / name) for name in own]
         done = [name for name, run in zip(own, stored, strict=True) if run and run["identity"]["record"] == record]
-        free = [name for name in own[stems[path.stem] > 1 :] if not (folder / name / INFERENCE[0]).exists()]
-        name = next((name for name in (*done, *free) if name not in names), None)
+        free = [name for name in own[stems[path.stem.casefold()] > 1 :] if not (folder / name / INFERENCE[0]).exists()]
+        taken = {name.casefold() for name in names}
+        name = next((name for name in (*done, *free) if name.casefold() not in taken), None)
         if name is None:
             raise ParameterError(
                 f"other records are called {own[0]} and {own[1]}, or {path} is given twice: rename one, since each has "
