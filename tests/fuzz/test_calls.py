@@ -20,12 +20,12 @@ from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
 from tactile_bayes.tasks import Workers
 
-# Bases, results, and parts of the forward model that its own code alone calls.
+# Bases and results.
 NOT_CALLED = {
     *(f"contours.{name}" for name in ("Contour", "Graph", "Single", "Locus")),
     *(f"datasets.{name}" for name in ("Specification", "Verification")),
     "TaskProgress",
-    *(f"elastica.{name}" for name in ("Contact", "Wrench", "forward_contacts", "lever_of_stem")),
+    *(f"elastica.{name}" for name in ("Contact", "Wrench")),
 }
 OF_ANY_NAME = ("Family", "Family.only", "Rig.with_unknown")  # what takes parameters of a contour or a rig by name
 pytestmark = pytest.mark.usefixtures("before_sampling")

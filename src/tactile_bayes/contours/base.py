@@ -19,7 +19,15 @@ Parameter = float | Floats
 
 
 class Locus(NamedTuple):
-    """Points of a contour at given parameters, and the rates of arc length and slope angle there."""
+    """Points of a contour at given parameters, and the rates of arc length and slope angle there.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import Parabola
+    >>> parabola = Parabola(0.5, q=0.3)
+    >>> parabola.locate(parabola.parameter_of_x(0.1)).y.round(3).item()
+    0.305
+    """
 
     x: Floats
     y: Floats
@@ -44,6 +52,13 @@ class Contour(ABC):
 
     Contours are equal if they are of one family and all their parameters are equal, including their shapes. A family
     that inherits this is a `dataclass(frozen=True, eq=False)`.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import Circle
+    >>> circles = Circle([0.5, 0.8], q=0.3)
+    >>> circles.shape, circles.height(0.1).round(4).tolist()
+    ((2,), [0.3101, 0.3063])
     """
 
     def __post_init__(self) -> None:
@@ -211,7 +226,14 @@ class Vertexed(Contour):
 
 
 class Single(Contour):
-    """A single contour without parameters of a family; it equals itself only."""
+    """A single contour without parameters of a family; it equals itself only.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import from_function
+    >>> isinstance(from_function(lambda x: 0.5 * x**2 + 0.3, (-1.0, 1.0)), Single)
+    True
+    """
 
     def __post_init__(self) -> None:
         pass

@@ -52,6 +52,16 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     -----
     UserWarning
         If shards are still missing.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tactile_bayes.datasets import generate
+    >>> spec = {"records": 2, "seed": 1, "contours": [{"family": "circle", "r": 0.5, "q": 0.3}]}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = open_dataset(generate(spec, folder, workers=1).parent).load()
+    >>> made.sizes["record"], made.attrs["units"]
+    (2, 'dimensionless')
     """
     folder = check_path("path", path, "give the folder of a data set")
     manifest = read_manifest(folder)

@@ -95,6 +95,12 @@ class Specification:
         Frame of the load cell.
     single : bool
         Whether files contain numbers of 32 bits.
+
+    Examples
+    --------
+    >>> from tactile_bayes.datasets import read_specification
+    >>> read_specification({"records": 10, "seed": 1, "contours": [{"family": "circle", "r": 0.5, "q": 0.3}]}).shards
+    1
     """
 
     text: str

@@ -24,7 +24,13 @@ from tactile_bayes.numerics.selection import evenly_spread
 
 
 class Verification(NamedTuple):
-    """Progress of a verification."""
+    """Progress of a verification.
+
+    Examples
+    --------
+    >>> Verification(files=3, wanted=12).wanted
+    12
+    """
 
     files: int  # number of files that are verified, unchanged or identical when regenerated
     wanted: int
@@ -57,6 +63,16 @@ def verify(
         message names the first such file.
     ParameterError
         If `regenerate` is not a number of shards.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tactile_bayes.datasets import generate
+    >>> spec = {"records": 2, "seed": 1, "contours": [{"family": "circle", "r": 0.5, "q": 0.3}]}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     generate(spec, folder, workers=1).name, verify(folder, progress=print).records
+    Verification(files=1, wanted=1)
+    ('manifest.json', 2)
     """
     check_whole_number("regenerate", regenerate, 0, "give a number of shards, 0 for none")
     check_function("progress", progress)

@@ -25,9 +25,7 @@ __all__ = [
     "Contact",
     "Wrench",
     "contact_from_wrench",
-    "forward_contacts",
     "largest_curvature",
-    "lever_of_stem",
     "tangential_arclength",
     "wrench_from_contact",
 ]
@@ -45,7 +43,13 @@ _MOST_HALVINGS, _SETTLED, _MISSED = 100, 1e-15, 1e-9
 
 
 class Wrench(NamedTuple):
-    """Base wrench of a contact and its derivatives; NaN where the rod cannot make it (`phase` is then `NONE`)."""
+    """Base wrench of a contact and its derivatives; NaN where the rod cannot make it (`phase` is then `NONE`).
+
+    Examples
+    --------
+    >>> wrench_from_contact(0.2, 0.6, 0.1).holding_moment.round(3).item()
+    2.183
+    """
 
     drive_angle: Floats  # slope φ0 of the rod at the pivot [rad]
     holding_moment: Floats  # moment m0 that the drive holds [EI/L]
@@ -64,7 +68,15 @@ class Wrench(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Contact that follows from a base wrench; NaN where there is none."""
+    """Contact that follows from a base wrench; NaN where there is none.
+
+    Examples
+    --------
+    >>> wrench = wrench_from_contact(0.2, 0.6, 0.1)
+    >>> found = contact_from_wrench(wrench.drive_angle, wrench.holding_moment, wrench.force_x, wrench.force_y)
+    >>> found.contact_x.round(9).item(), found.contact_y.round(9).item()
+    (0.2, 0.6)
+    """
 
     contact_x: Floats
     contact_y: Floats  # contact point relative to the pivot [L]

@@ -63,6 +63,11 @@ class Criterion:
     ------
     ParameterError
         If there is no such criterion, the span is empty, or the probability is impossible.
+
+    Examples
+    --------
+    >>> Criterion("gap", probability=0.9).name
+    'gap'
     """
 
     name: CriterionName = "band"
@@ -207,6 +212,12 @@ def usual_drives(
         As in `design`.
     drive_step : float, optional
         As in `Rotation`.
+
+    Examples
+    --------
+    >>> drives = usual_drives()
+    >>> len(drives), drives[0].base
+    (33, (-0.5, -0.1))
     """
     drives, rod = [], rig_of(rig).rod or Rod()
     if isinstance(known, xr.DataTree):

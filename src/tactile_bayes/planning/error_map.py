@@ -67,6 +67,11 @@ class Bands:
     ------
     ParameterError
         If a number is impossible.
+
+    Examples
+    --------
+    >>> Bands(probability=0.9).posterior_cells
+    0
     """
 
     probability: float = 0.95

@@ -79,6 +79,15 @@ def required_noise(
     ------
     ParameterError
         If a width is not positive, no noise is small enough for it, or the sweeps leave no gap and `where` is "gap".
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import paper_profile
+    >>> from tactile_bayes.planning import Plan
+    >>> from tactile_bayes.rig import Rig
+    >>> plan = Plan(paper_profile("II", q=0.5), Rig(unknown="nothing"))
+    >>> required_noise(plan, [0.001, 0.002])["noise_factor"].diff("band_width").item() > 0.0
+    True
     """
     check_kind("plan", plan, Plan, "give a Plan")
     check_probability("probability", probability)
@@ -161,6 +170,18 @@ def required_rod(
     ParameterError
         If the plan is not in SI units or states no load cell, or a length, a diameter, the modulus or the strain is not
         positive.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import Parabola
+    >>> from tactile_bayes.load_cell import LoadCell
+    >>> from tactile_bayes.planning import Plan
+    >>> from tactile_bayes.rig import Rig
+    >>> rod, cell = Rod.circular(0.2, 0.7e-3, 206e9), LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+    >>> plan = Plan(Parabola(2.5, q=0.1), Rig(rod, cell, unknown="nothing"))
+    >>> steel = {"youngs_modulus": 206e9, "elastic_strain": 0.005}
+    >>> required_rod(plan, lengths=[0.2], diameters=[0.7e-3], **steel)["status"].item()
+    'bent too far'
     """
     check_kind("plan", plan, Plan, "give a Plan")
     check_probability("probability", probability)

@@ -56,6 +56,15 @@ def contact_ellipses(
     ------
     ParameterError
         If no sample has an ellipse, or the probability is not in (0, 1).
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, reconstruct, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+    >>> contact_ellipses(reconstruct(measured)).get_ylabel()
+    '$y$ [$L$]'
     """
     check_probability("probability", probability)
     numbers = checked_samples(samples)
@@ -110,6 +119,15 @@ def contact_regions(
     ------
     ParameterError
         If no sample has a contact, or the probability is not in (0, 1).
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, infer_contacts, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+    >>> contact_regions(infer_contacts(measured, draws=400, rng=1)).get_ylabel()
+    '$y$ [$L$]'
     """
     from tactile_bayes.inference.result import contact_draws
     from tactile_bayes.uncertainty.contact_moments import LEAST_DRAWS

@@ -106,6 +106,16 @@ def posterior_contours(
     ------
     ParameterError
         If the tree is not a posterior of a contour, or `contours` is not positive.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> posterior_contours(infer_contour(measured, rig=Rig(unknown="nothing"), rng=1, settings=quick)).get_ylabel()
+    '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of
     from tactile_bayes.uncertainty.band import contours_drawn

@@ -43,6 +43,12 @@ def style(name: Style = "print") -> Iterator[None]:
     """Give figures that are made and saved inside the block one look; Matplotlib's settings are restored after it.
 
     Fonts go into a file when it is saved: `savefig` belongs inside the block, too.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> with style("screen"):
+    ...     axes = Figure().subplots()
     """
     check_choice("style", name, STYLES)
     import matplotlib as mpl

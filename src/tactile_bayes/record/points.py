@@ -59,6 +59,16 @@ def read_points(path: str | os.PathLike[str], *, beside: str = "") -> Points:
         If there are no points, a line is no point, or a unit is none of length.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "points.csv"
+    ...     written = path.write_text("x [mm],y [mm]\\n0,100\\n50,106\\n", encoding="utf-8")
+    ...     points = read_points(path)
+    >>> points.unit, points.pieces[0].tolist()
+    ('m', [[0.0, 0.1], [0.05, 0.106]])
     """
     check_kind("beside", beside, str, 'give the name of a column, or ""')
     file = check_path("path", path, "give a path, like 'points.csv' or 'part.dxf'")

@@ -79,6 +79,21 @@ def write_report(
         path.
     OSError
         If the page cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contours, scan, write_record
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+    >>> quick = {"rng": 1, "settings": SamplerSettings(min_ess=100, max_r_hat=1.1), "figures": False}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path, out = Path(folder) / "one.csv", Path(folder) / "runs"
+    ...     write_record(measured, path)
+    ...     table = infer_contours([path], Rig(unknown="nothing"), out=out, **quick)
+    ...     write_report(out / "one").name
+    'report.html'
     """
     return report_into(run, out, compare, overlay, progress).path
 

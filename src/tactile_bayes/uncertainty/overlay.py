@@ -88,6 +88,18 @@ def read_overlay(path: str | os.PathLike[str], posterior: xr.DataTree, probabili
     ------
     ParameterError, InferenceError
         If the file holds no points, or in another kind of unit than the record; if the folder holds no run.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> posterior = xr.DataTree()
+    >>> posterior.attrs["units"] = "SI"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "points.csv"
+    ...     written = path.write_text("x [mm],y [mm]\\n0,100\\n50,106\\n", encoding="utf-8")
+    ...     read_overlay(path, posterior).name
+    'points.csv'
     """
     given = check_path("path", path, "give the folder of a run, or a file, like 'points.csv' or 'part.dxf'")
     check_probability("probability", probability)
