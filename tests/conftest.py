@@ -38,7 +38,7 @@ def pytest_sessionstart(session):
 
 # Calls that take a second or more.
 SAMPLING = re.compile(
-    r"\b(infer_(contour|rig|point_load)|calibrat(e|ion_replicate)|compare_families|Stream(Comparison)?|design)\("
+    r"\b(infer_(contours?|rig|point_load)|calibrat(e|ion_replicate)|compare_families|Stream(Comparison)?|design)\("
 )
 OWN_EXAMPLES = "inference.contour.infer_contour"
 
