@@ -7,6 +7,7 @@ import xarray as xr
 from helpers.commands import call
 from helpers.comparisons import NAMES, made_up
 from tactile_bayes.inference.ensembles import Progress
+from tactile_bayes.record.netcdf import RESULT_FORMAT
 from tactile_bayes.runs import comparison as comparison_run
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -73,7 +74,7 @@ def test_the_verdict_comes_first_then_the_table_then_the_files(compared):
 )
 def test_what_is_written_is_read_back(comparison, tmp_path):
     files = comparison_run.write_comparison(comparison, tmp_path)
-    assert xr.load_dataset(files["comparison"], engine="h5netcdf").identical(comparison)
+    assert xr.load_dataset(files["comparison"], engine="h5netcdf").identical(comparison.assign_attrs(RESULT_FORMAT))
     assert {path.name for path in tmp_path.iterdir()} == FILES
 
 
