@@ -73,7 +73,7 @@ class Target:
 
     @property
     def bounds(self) -> Floats:
-        """Ends of the parameters, shape (parameters, 2): by definition, and by their priors."""
+        """Return the ends of the parameters by definition and by their priors, shape (parameters, 2)."""
         return np.stack([self.model.ends.low, self.model.ends.high], axis=1)
 
     def log_prior(self, points: ArrayLike) -> Floats:
