@@ -1,9 +1,14 @@
 """A posterior in numbers, and where the rod touched its contours."""
 
+import math
+
 import numpy as np
+import xarray as xr
 
 from helpers.refusals import refused
+from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.report.page import parameter_cells
 from tactile_bayes.uncertainty.rod_reach import reach
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
@@ -14,6 +19,18 @@ def test_the_summary_has_the_probability_it_is_asked_for(analysed):
     assert wide.quantity.values[-1] == "gap width"
     assert (narrow["lower"] > wide["lower"]).all()
     assert (narrow["upper"] < wide["upper"]).all()
+
+
+def test_people_read_angles_in_degrees():
+    values = {"median": 0.02, "lower": -0.01, "upper": 0.03, "r_hat": 1.0, "ess_bulk": 9.0, "ess_tail": 9.0}
+    row = {name: ("quantity", [value]) for name, value in values.items()} | {"unit": ("quantity", ["rad"])}
+    numbers = xr.Dataset(row, {"quantity": ["backlash"]}, {"probability": 0.95})
+    _, *printed = [next(column.cells) for column in quantities(numbers, {"backlash": 0.025}).columns]
+    _, _, unit, *reported = parameter_cells(numbers.isel(quantity=0), "circle")
+    assert printed[4] == unit == "°"
+    for shown in (printed[1:4], [cell.replace("−", "-") for cell in reported]):
+        np.testing.assert_allclose([float(cell) for cell in shown], np.degrees([0.02, -0.01, 0.03]), atol=0.05)
+    np.testing.assert_allclose(float(printed[0]), math.degrees(0.025), atol=0.05)
 
 
 def test_the_band_is_where_events_are(analysed):

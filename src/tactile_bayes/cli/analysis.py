@@ -217,6 +217,8 @@ def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float
 
 def quantities(numbers: xr.Dataset, truth: Mapping[str, float]) -> Table:
     """Return the table of a summary, with the true values of a demonstration."""
+    from tactile_bayes.uncertainty.summary import shown_in
+
     share = f"{numbers.attrs['probability']:.0%}"
     heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
     rows = []
@@ -224,13 +226,13 @@ def quantities(numbers: xr.Dataset, truth: Mapping[str, float]) -> Table:
         if name.startswith("z_"):  # a weight of a random function, which has no meaning by itself
             continue
         row: Any = numbers.sel(quantity=name)
-        digits = decimals(float(row["upper"] - row["lower"]))
-        shown = [f"{float(row[column]):.{digits}f}" for column in ("median", "lower", "upper")]
-        true = [f"{truth[name]:.{digits}f}" if name in truth else ""] if truth else []
+        scale, unit = shown_in(str(row["unit"].values))
+        digits = decimals(scale * float(row["upper"] - row["lower"]))
+        shown = [f"{scale * float(row[column]):.{digits}f}" for column in ("median", "lower", "upper")]
+        true = [f"{scale * truth[name]:.{digits}f}" if name in truth else ""] if truth else []
         ess = min(float(row["ess_bulk"]), float(row["ess_tail"]))
         checks = ["", ""] if ess != ess else [f"{float(row['r_hat']):.3f}", f"{ess:.0f}"]
-        unit = str(row["unit"].values)
-        rows.append([str(name), *true, *shown, "" if unit == "1" else unit, *checks])
+        rows.append([str(name), *true, *shown, unit, *checks])
     return table_of(heads, rows, left=["quantity", "unit"], may_wrap=True)
 
 

@@ -18,6 +18,7 @@ from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
 from tactile_bayes.report.trust import trust_of
 from tactile_bayes.report.wording import PageTable, chance, fixed, percent, rows_of, sentence, shown_as, spread
+from tactile_bayes.uncertainty.summary import shown_in
 
 
 def page_of(findings: Findings, name: str) -> dict[str, Any]:
@@ -184,6 +185,6 @@ def _parameters(findings: Findings, *, mute: bool) -> PageTable:
 
 def parameter_cells(row: xr.Dataset, family: str) -> list[str]:
     """Return name, meaning, unit, median and interval of a row of a summary."""
-    name, unit = str(row["quantity"].values), str(row["unit"].values)
-    values = [float(row[column]) for column in ("median", "lower", "upper")]
-    return [name, meaning_of(name, family), "" if unit == "1" else unit, *spread(values, values[2] - values[1])]
+    name, (scale, unit) = str(row["quantity"].values), shown_in(str(row["unit"].values))
+    values = [scale * float(row[column]) for column in ("median", "lower", "upper")]
+    return [name, meaning_of(name, family), unit, *spread(values, values[2] - values[1])]

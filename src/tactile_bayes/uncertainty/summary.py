@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,11 @@ def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset
         coords={"quantity": list(quantity)},
         attrs={"probability": probability},
     )
+
+
+def shown_in(unit: str) -> tuple[float, str]:
+    """Return the factor and the name of the unit in which people read a parameter: degrees for radians."""
+    return (math.degrees(1.0), "°") if unit == "rad" else (1.0, "" if unit == "1" else unit)
 
 
 def gap_if_any(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
