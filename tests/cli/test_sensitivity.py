@@ -80,8 +80,9 @@ def test_words_come_first_then_bounds_then_the_files(done, analysed):
     assert [row[0] for row in rows[1:]] == list(told.parameter.values)
     for row in rows[1:]:
         of = told.sel(parameter=row[0])
-        assert row[1:3] == [f"{float(of.value):.3g}", f"{float(of.bound_with_priors):.3g}"]
-    assert rows[1 + list(told.parameter.values).index("drive_angle_offset")][-1] == "rad"
+        scale = np.degrees(1.0) if row[-1] == "°" else 1.0
+        assert row[1:3] == [f"{scale * float(of.value):.3g}", f"{scale * float(of.bound_with_priors):.3g}"]
+    assert rows[1 + list(told.parameter.values).index("drive_angle_offset")][-1] == "°"
     paths = dict(line.split(maxsplit=1) for line in files.splitlines())
     parts = {name.removesuffix(".png") for name in FIGURES}
     assert set(paths) == {"sensitivity", "words", "cells", "study", "errors"} | parts

@@ -151,10 +151,13 @@ def _answer(run: SensitivityRun) -> Answer:
 
 
 def _table(information: xr.Dataset) -> Table:
+    from tactile_bayes.uncertainty.summary import shown_in
+
     rows = []
     for row in columns_of(information, "parameter"):
-        numbers = (f"{row[name]:.3g}" for name in ("value", "bound_with_priors"))
-        rows.append((row["parameter"], *numbers, "" if row["unit"] == "1" else row["unit"]))
+        scale, unit = shown_in(row["unit"])
+        numbers = (f"{scale * row[name]:.3g}" for name in ("value", "bound_with_priors"))
+        rows.append((row["parameter"], *numbers, unit))
     return table_of(["parameter", "value", "known to ±", "unit"], rows, left=["parameter", "unit"])
 
 
