@@ -26,6 +26,7 @@ _SLOWEST = float(np.finfo(float).tiny)
 _MISSED = 1e-9
 _FEET = 25  # number of feet by which contours are moved
 _ROUNDS, _SHARES = 3, (1.0, 0.5, 0.25, 0.125)  # Gauss–Newton steps, and the shares of each that are tried
+_SETTLED = 1e-9  # step, as a share of the size of what is moved, that no longer counts
 # Share of the largest singular value below which a move leaves the contour as it is, like a turn of a circle.
 _INVARIANT = 1e-3
 
@@ -92,31 +93,42 @@ def aligned(contours: Contour, feet: Feet, alignment: str) -> Moves:
     # A turn and a growth count as they move the feet.
     size = (float(np.sqrt(np.nanmean(x**2 + y**2))) if there.any() else 0.0) or 1.0
     effects = np.stack([-sin, cos, (sin * y + cos * x) / size, (cos * y - sin * x) / size])[: ALIGNMENTS[alignment]]
+    offsets = normal_offsets(contours, feet, moves)
     for count_of in range(2, ALIGNMENTS[alignment] + 1):  # a shift first: a turn that is large is no small one
         for _ in range(_ROUNDS):
-            moves = _nearer(contours, feet, moves, effects[:count_of], size)
+            before, (moves, offsets) = moves, _nearer(contours, feet, moves, offsets, effects[:count_of], size)
+            if moves is before:
+                break
     return moves
 
 
-def _nearer(contours: Contour, feet: Feet, moves: Moves, effects: Floats, size: float) -> Moves:
-    """Return moves after a Gauss–Newton step, or the part of it by which a contour comes nearer to the feet."""
-    offsets = normal_offsets(contours, feet, moves)
+def _nearer(
+    contours: Contour, feet: Feet, moves: Moves, offsets: Floats, effects: Floats, size: float
+) -> tuple[Moves, Floats]:
+    """Return moves and offsets after a Gauss–Newton step, or the part of it by which a contour comes nearer to the feet.
+
+    The moves are the same ones if no step counts.
+    """
     met = np.isfinite(offsets).all(axis=0)
     steps = np.zeros((4, len(offsets)))
     steps[: len(effects)] = -np.linalg.pinv(effects[:, met].T, rcond=_INVARIANT) @ offsets[:, met].T
+    left = np.flatnonzero(np.abs(steps).max(axis=0) > _SETTLED * size)  # contours that are not nearer yet
+    if not left.size:
+        return moves, offsets
     steps[2:] /= size
-    best, least = moves, np.sum(offsets[:, met] ** 2, axis=1)
+    about, (shift, factor), offsets = moves.about, map(np.copy, moves[1:]), offsets.copy()
+    least = np.sum(offsets[:, met] ** 2, axis=1)
     for share in _SHARES:
-        shift_x, shift_y, turn, growth = share * steps
-        factor = (1.0 + growth) * np.exp(1j * turn)
-        tried = Moves(moves.about, factor * moves.shift + shift_x + 1j * shift_y, factor * moves.factor)
-        total = np.sum(normal_offsets(contours, feet, tried)[:, met] ** 2, axis=1)
-        better = total < least  # not where a normal no longer meets its contour
-        best = Moves(moves.about, *(np.where(better, new, old) for new, old in zip(tried[1:], best[1:], strict=True)))
-        least = np.where(better, total, least)
-        if better.all():
+        shift_x, shift_y, turn, growth = share * steps[:, left]
+        more = (1.0 + growth) * np.exp(1j * turn)
+        tried = Moves(about, more * moves.shift[left] + shift_x + 1j * shift_y, more * moves.factor[left])
+        found = normal_offsets(contours.take(left), feet, tried)
+        better = np.sum(found[:, met] ** 2, axis=1) < least[left]  # not where a normal no longer meets its contour
+        nearer, left = left[better], left[~better]
+        shift[nearer], factor[nearer], offsets[nearer] = tried.shift[better], tried.factor[better], found[better]
+        if not left.size:
             break
-    return best
+    return Moves(about, shift, factor), offsets
 
 
 def normal_offsets(contours: Contour, feet: Feet | Locus, moves: Moves | None = None) -> Floats:
