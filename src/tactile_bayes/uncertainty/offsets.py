@@ -105,9 +105,9 @@ def aligned(contours: Contour, feet: Feet, alignment: str) -> Moves:
 def _nearer(
     contours: Contour, feet: Feet, moves: Moves, offsets: Floats, effects: Floats, size: float
 ) -> tuple[Moves, Floats]:
-    """Return moves and offsets after a Gauss–Newton step, or the part of it by which a contour comes nearer to the feet.
+    """Return moves and offsets after a Gauss–Newton step, or the part of it by which a contour comes nearer.
 
-    The moves are the same ones if no step counts.
+    The moves are the same object if no step counts.
     """
     met = np.isfinite(offsets).all(axis=0)
     steps = np.zeros((4, len(offsets)))
