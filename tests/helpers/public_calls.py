@@ -21,6 +21,7 @@ from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
 from tactile_bayes.planning.error_map import Bands
 from tactile_bayes.rig import FileFormat, Rig
+from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.sweep import scan_many
 
 PARABOLA = tb.contours.Parabola(0.5, 0.5)
@@ -362,6 +363,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
     deflections["reading"] = np.linspace(0.1, 0.9, 20) ** 2
     several = {"families": ["parabola", "circle"], **STREAM}
     sampled = {"rig": STATED, "rng": 1, "settings": BRIEF}
+    found = RigPrior({"lever_x": stats.norm(0.0, 0.01)}, np.eye(1), 0.0, "")
     unknown_lever = {"rig": STATED.with_unknown(lever="default")}
     comparison = tb.comparison.StreamComparison
     return {
@@ -377,6 +379,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         "Rig.of": right(tb.Rig.of, posterior=posterior()),
         "Rig.of_tables": right(tb.Rig.of_tables, tables=STATED.tables, folder=folder),
         "Rig.read": right(tb.Rig.read, path=rig_file),
+        "Rig.with_session": right(Rig(calibration=found).with_session, lever_x=0.01),
         "Rig.with_unknown": right(STATED.with_unknown, friction=0.2),
         "Rig.write": right(STATED.write, path=folder / "other.toml"),
         "Family": right(functools.partial(tb.Family, "circle"), r=0.2, x_c=stats.norm(0.0, 0.1)),

@@ -228,6 +228,27 @@ def test_a_file_may_name_that_of_another_rig(tmp_path):
         Rig.read(tmp_path / "third.toml")
 
 
+def test_a_session_differs_from_a_calibration(tmp_path):
+    """Its rig is that of the calibration plus independent normal deviations, of log-normal ones in the logarithm."""
+    Rig(calibration=CALIBRATION, rod=RODS["SI, all"]).write(tmp_path / "calibrated.toml")
+    differs = 'rig = "calibrated.toml"\n[session]\nlever_x = "1 mm"\nrigidity_scale = 0.02\n'
+    rig = read(tmp_path / "rig.toml", differs)
+    assert rig.text == Rig.read(tmp_path / "calibrated.toml").with_session(lever_x=0.001, rigidity_scale=0.02).text
+    found = rig.calibration.draw(np.random.default_rng(1), 40000)
+    expected = CALIBRATION.draw(np.random.default_rng(2), 40000)
+    expected[:, 0] *= np.exp(np.random.default_rng(3).normal(0.0, 0.02, 40000))
+    expected[:, 1] += np.random.default_rng(4).normal(0.0, 0.001, 40000)
+    np.testing.assert_allclose(found.std(axis=0), expected.std(axis=0), rtol=0.02)
+    np.testing.assert_allclose(np.corrcoef(found.T), np.corrcoef(expected.T), atol=0.02)
+    for wrong, words in (("taper = 0.1", "taper"), ("friction = 0.1", "friction"), ("lever_x = -1.0", "lever_x")):
+        with refused(ParameterError, "session", words):
+            read(tmp_path / "rig.toml", f'rig = "calibrated.toml"\n[session]\n{wrong}\n')
+    with refused(ParameterError, "session", "calibrated"):
+        read(tmp_path / "rig.toml", "[session]\nlever_x = 0.1\n")
+    with refused(ParameterError, "session", "calibrate_rig"):
+        Rig().with_session(lever_x=0.1)
+
+
 @pytest.mark.parametrize("key", ["rest_curvature = 1.0", "rest_curvature_deviation = 0.1", "taper_deviation = 0.01"])
 def test_what_follows_from_a_shape_is_not_stated_beside_it(tmp_path, key):
     write_shape(tmp_path, S, 0.2 * S**2)

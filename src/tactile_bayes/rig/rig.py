@@ -170,6 +170,32 @@ class Rig:
         """Return the rig of which something else is said about some parameters."""
         return replace(self, unknown={**self.entries, **said})
 
+    def with_session(self, **deviations: float) -> Rig:
+        """Return the calibrated rig as it is in another session, in which some of its parameters differ.
+
+        Parameters
+        ----------
+        **deviations : float
+            Standard deviations by which calibrated parameters differ from session to session, in the record's units; of
+            gains and stiffness relative ones.
+
+        Raises
+        ------
+        ParameterError
+            If the rig is not calibrated, or the calibration has found no such parameter, or one that may vanish.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from scipy import stats
+        >>> found = RigPrior({"drive_angle_offset": stats.norm(0.01, 0.003)}, np.eye(1), 0.0, "")
+        >>> Rig(calibration=found).with_session(drive_angle_offset=0.004).calibration
+        RigPrior(drive_angle_offset=norm(0.01, 0.005))
+        """
+        if self.calibration is None:
+            raise ParameterError("a session differs from a calibration: give a rig from calibrate_rig")
+        return replace(self, calibration=self.calibration.in_a_session(deviations))
+
     def draw(self, rng: Rng, *, pivots: int = 1) -> Rig:
         """Draw a rig of numbers: each unknown has a value, and is known.
 

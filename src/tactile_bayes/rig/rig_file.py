@@ -47,6 +47,7 @@ TABLES = {
     "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), *OPTIONS),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
+    "session": tuple(PARAMETERS),
 }
 _ONE_OF_BOTH = "[rod] states youngs_modulus: give the diameter beside it, and leave out flexural_rigidity"
 _OF_SHAPE = ("rest_curvature", "rest_curvature_deviation", "rest_shape_modes", "taper_deviation")
@@ -161,6 +162,14 @@ def stated_in(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         found["unknown"] = _unknown(said["unknown"], is_si)
     if "calibration" in said:
         found["calibration"] = calibration_of(said["calibration"])
+    if "session" in said:
+        if found["calibration"] is None:
+            raise ParameterError('[session] says by how much a calibrated rig differs: name it, rig = "rig/rig.toml"')
+        deviations = {
+            name: _quantity(value, unit_of_unknown(name), f"session.{name}", is_si)
+            for name, value in said["session"].items()
+        }
+        found["calibration"] = found["calibration"].in_a_session(deviations)
     return found | ({"file": said["file"]} if "file" in said else {})
 
 

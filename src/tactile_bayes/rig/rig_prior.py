@@ -12,7 +12,10 @@ import xarray as xr
 from scipy import stats
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_positive
 from tactile_bayes.distributions import Distribution, in_words, numbers_of
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.record.spelling import refuse_unknown_keys
 
 _FARTHEST = 30.0  # largest normal score, beyond which densities vanish anyway
 
@@ -53,6 +56,23 @@ class RigPrior:
         kept = [i for i, name in enumerate(self.priors) if name not in names]
         own = {name: prior for name, prior in self.priors.items() if name not in names}
         return replace(self, priors=own, correlation=self.correlation[np.ix_(kept, kept)])
+
+    def in_a_session(self, deviations: Mapping[str, Any]) -> RigPrior:
+        """Return the prior of a rig whose parameters differ in each session, by these standard deviations."""
+        refuse_unknown_keys(deviations, self.priors, "session.")
+        priors, kept = dict(self.priors), np.ones(len(self.priors))
+        for name, value in deviations.items():
+            deviation = check_positive(f"session.{name}", value, "leave it out if it is the same in every session")
+            kind, numbers = self.priors[name].dist, numbers_of(self.priors[name])  # type: ignore[attr-defined]
+            if kind.name not in ("norm", "lognorm"):
+                raise ParameterError(f"session.{name} may vanish, and has no normal deviation: leave it out")
+            width = "scale" if kind.name == "norm" else "s"
+            whole = float(np.hypot(numbers[width], deviation))
+            kept[list(priors).index(name)] = numbers[width] / whole
+            priors[name] = kind(**{**numbers, width: whole})
+        correlation = self.correlation * np.outer(kept, kept)
+        np.fill_diagonal(correlation, 1.0)
+        return replace(self, priors=priors, correlation=correlation)
 
     def log_dependence(self, points: Floats) -> Floats:
         """Return the log-density of points, shape (n, parameters), less that of independent marginals, shape (n,)."""

@@ -4,13 +4,15 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from helpers.contour_posteriors import CELL
-from tactile_bayes.contours import Parabola
+from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of
-from tactile_bayes.rig import Rig
+from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of, smooth_optimum
+from tactile_bayes.inference.starts.contour_start import mean_square_left
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import scan
 
 TRUTH = {"a": 1.484, "q": 0.686, "x_c": -0.8774, "friction": 0.45}
@@ -51,3 +53,30 @@ def test_a_rig_that_corrects_the_record_to_none_fits_no_contour(brief):
     """As a search may try, from a prior draw that is far out."""
     _, model = brief
     assert contact_fit(model, {"drive_angle_offset": -9.0}) is None
+
+
+@pytest.mark.slow
+def test_a_moment_alone_is_enough_for_a_circle():
+    """Without forces there are no contact points, and draws of a rough prior are far from all records."""
+    measured = CELL.measure(scan(Circle(0.3, q=0.5), drive_step=0.05).record, rng=1)
+    measured = measured.assign({name: np.nan * measured[name] for name in ("force_x", "force_y")})
+    model = contour_problem(Experiment(measured, Rig(load_cell=CELL, unknown="nothing"), "shape-free")).model
+    found = smooth_optimum(model, np.random.default_rng(1))
+    values = dict(zip(model.names, found, strict=True))
+    assert values["z_1"] == 0.0
+    assert values["r"] == pytest.approx(0.3, rel=0.2)
+    assert mean_square_left(model, found) < 2.0
+
+
+def test_what_a_discrepancy_describes_is_no_misfit():
+    smooth = {"discrepancy_scale": stats.lognorm(s=1e-9, scale=0.05), "discrepancy_length": stats.lognorm(s=0.1)}
+    left = []
+    measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.05).record, rng=1)
+    measured["holding_moment"] += 0.02 * (measured.holding_moment != 0.0)
+    for unknown in ({}, smooth):
+        rig = Rig(load_cell=CELL, unknown={**NOTHING, **unknown})
+        model = contour_problem(Experiment(measured, rig)).model
+        values = {"a": 0.5, "q": 0.5, "noise_scale": 1.0, "discrepancy_scale": 0.05, "discrepancy_length": 1.0}
+        left.append(mean_square_left(model, np.array([values.get(name, 0.0) for name in model.names])))
+    assert left[1] < 2.0
+    assert left[1] < left[0]

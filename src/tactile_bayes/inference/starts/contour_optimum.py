@@ -25,6 +25,7 @@ _PRIOR_DRAWS = 1000
 # Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
 # early, since a sample at an event is loaded or not.
 _CANDIDATES = 24
+_SMOOTH_STARTS = 6  # of these from which contours without roughness are sought
 _EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
 _MAX_LOG_DISTANCE = 12.0  # of the log of a parameter from its prior median in a search, in prior spreads
 _DECAY = 5.0  # lags after which a load that has ended is a hundredth of itself
@@ -125,6 +126,12 @@ def optimum_beside(
     return search.complete(search.refine(best))
 
 
+def smooth_optimum(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Floats:
+    """Return the parameters of the best contour without roughness: a circle, with a flat side if the family has one."""
+    search = _Search(model, rng, deadline)
+    return search.complete(search.smooth()).point
+
+
 class _Search:
     """Least squares over the forward-model parameters, positive ones by their logarithms; noise from residuals."""
 
@@ -208,6 +215,37 @@ class _Search:
                 yield descend(missed, place, self.middle, self.spread, deadline=self.deadline).point
             else:
                 yield place
+
+    def smooth(self) -> Optimum:
+        """Return the best contour without roughness, as the loads have it with the usual rig."""
+        family, names = self.model.family, self.model.forward_parameters
+        free = [i for i, name in enumerate(names) if name in family.parameters and name not in family.roughness]
+        usual = self.coordinates.of(self.usual)
+        usual[np.char.startswith(names, "z_")] = 0.0
+
+        def whole(some: Floats) -> Floats:
+            every = np.tile(usual, (len(some), 1))
+            every[:, free] = some
+            return every
+
+        def residuals(some: Floats) -> Floats:
+            return self.residuals(whole(some))
+
+        def missed(some: Floats) -> Floats:
+            return residuals(some)[:, self.measured.size :]
+
+        drawn = self.drawn[:, free]
+        costs = np.sum(np.minimum(np.abs(residuals(drawn)), 30.0), axis=1)
+        limits = [limit[free] for limit in self.limits[:-1]]
+        best: Optimum | None = None
+        for place in drawn[np.argsort(costs)[:_SMOOTH_STARTS]]:
+            if self.brackets.low.size:
+                place = descend(missed, place, *limits[:2], deadline=self.deadline).point
+            found = next(optima(residuals, [place], *limits, self.deadline))
+            best = found if best is None or found.cost < best.cost else best
+        assert best is not None
+        covariance = np.diag(np.square(self.spread))
+        return Optimum(whole(best.point[None])[0], covariance, best.residuals, best.cost)
 
     def _at_contacts(self, found: Mapping[str, float] | None = None) -> Floats | None:
         """Return coordinates of the contour of `contact_fit`, with the usual rig."""

@@ -19,19 +19,24 @@ from tactile_bayes.inference.densities import Mixture
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.importance import refined
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.shape_free_posterior.observations import Observer
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening, whitening_at
 from tactile_bayes.inference.starts.cloud import gather
-from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optimum_of
+from tactile_bayes.inference.starts.contour_optimum import (
+    ContourOptimum,
+    contact_fit,
+    fitted_noise,
+    optimum_of,
+    smooth_optimum,
+)
 from tactile_bayes.inference.starts.modes import Modes
 from tactile_bayes.inference.starts.pilot import standardise
+from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
 
 # Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
 # noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
-_PRIOR_DRAWS = 500  # among which the likeliest is sought
-_LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
+_PRIOR_DRAWS = 500  # among which the likeliest is sought, if time is up
 _FARTHEST = 5.0  # standard deviations at which residuals are clipped: a sample beside an event may be loaded or not
 _SMOOTH = 2.5  # root mean square of a channel's residuals, over the noise between neighbours, that no noise explains
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
@@ -86,7 +91,7 @@ class _Start(NamedTuple):
             for point in points:
                 if best is None or not self.deadline.has_passed:
                     whitening = whitening_at(self.model, point, self.rng, self.deadline)
-                    misfit, centre = _misfit(self.model, whitening.centre), whitening.centre[None]
+                    misfit, centre = mean_square_left(self.model, whitening.centre), whitening.centre[None]
                     rank = misfit < _POOR_MISFIT, float(self.model.log_probability(centre)[0]), -misfit
                     if best is None or rank > best[0]:
                         best = rank, whitening
@@ -96,15 +101,14 @@ class _Start(NamedTuple):
         return best[1]
 
     def _starting_points(self) -> Iterator[Iterable[Floats]]:
-        """Yield parameters fitted to Step 2's contacts, the likeliest of some draws of the prior, those of a search."""
+        """Yield parameters fitted to Step 2's contacts, those of circles, and those of a search."""
         model = self.model
         by_contacts = contact_fit(model)
         if by_contacts is not None:
             of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
             of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
             yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
-        drawn, _ = model.draw_prior(self.rng, _PRIOR_DRAWS, self.deadline)
-        yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
+        yield [smooth_optimum(model, self.rng, self.deadline)]
         yield [optimum_of(model, self.rng, self.deadline).point]
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
@@ -191,7 +195,18 @@ def _residuals(model: ContourModel, point: Floats) -> Floats:
     return np.asarray(model.likelihood.measured - cell.cut(cell.expected(model.loads(point[None])))[0])
 
 
-def _misfit(model: ContourModel, point: Floats) -> float:
-    """Return the mean square of the residuals at a point, over a coarse noise of the record, with outliers clipped."""
-    left = _residuals(model, point)
-    return float(np.mean(np.minimum(np.abs(left / model.deviations)[:, model.present], _FARTHEST) ** 2))
+def mean_square_left(model: ContourModel, point: Floats) -> float:
+    """Return the mean square of the residuals at a point, over a coarse noise of the record, with outliers clipped.
+
+    Beside a discrepancy they are those of each sample given the ones before it.
+    """
+    from tactile_bayes.load_cell.kalman import given_before  # numba takes a second to load
+
+    left, noise = _residuals(model, point)[:, model.present], model.deviations[:, model.present]
+    discrepancy = model.discrepancy_at(point)
+    if discrepancy is not None:
+        none = np.zeros(left.shape[1])
+        still = Zero(none, none, none, 1.0)
+        left, variance = given_before(left, noise**2, still, discrepancy.of(np.flatnonzero(model.present)))
+        noise = np.sqrt(variance)
+    return float(np.mean(np.minimum(np.abs(left / noise), _FARTHEST) ** 2))
