@@ -19,6 +19,7 @@ from tactile_bayes.inference.densities import Mixture
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.importance import refined
 from tactile_bayes.inference.misfit import what_to_try
+from tactile_bayes.inference.shape_free_posterior.observations import Observer
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening, whitening_at
 from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.inference.starts.contour_optimum import (
@@ -36,7 +37,8 @@ from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
 # Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
 # noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
-_PRIOR_DRAWS = 500  # among which the likeliest is sought, if time is up
+_PRIOR_DRAWS = 500  # among which the likeliest is sought
+_LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
 _FARTHEST = 5.0  # standard deviations at which residuals are clipped: a sample beside an event may be loaded or not
 _SMOOTH = 2.5  # root mean square of a channel's residuals, over the noise between neighbours, that no noise explains
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
@@ -101,14 +103,18 @@ class _Start(NamedTuple):
         return best[1]
 
     def _starting_points(self) -> Iterator[Iterable[Floats]]:
-        """Yield parameters fitted to Step 2's contacts, those of circles, and those of a search."""
+        """Yield parameters fitted to Step 2's contacts and the likeliest of some draws of the prior, or without contacts
+        those of a circle, and at last those of a search."""
         model = self.model
         by_contacts = contact_fit(model)
         if by_contacts is not None:
             of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
             of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
             yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
-        yield [smooth_optimum(model, self.rng, self.deadline)]
+            drawn, _ = model.draw_prior(self.rng, _PRIOR_DRAWS, self.deadline)
+            yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
+        else:
+            yield [smooth_optimum(model, self.rng, self.deadline)]
         yield [optimum_of(model, self.rng, self.deadline).point]
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
