@@ -103,7 +103,7 @@ class _Start(NamedTuple):
         return best[1]
 
     def _starting_points(self) -> Iterator[Iterable[Floats]]:
-        """Yield parameters fitted to Step 2's contacts and the likeliest of some draws of the prior, or without contacts
+        """Yield parameters fitted to Step 2's contacts and the likeliest draws of the prior, or without contacts
         those of a circle, and at last those of a search."""
         model = self.model
         by_contacts = contact_fit(model)
