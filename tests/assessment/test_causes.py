@@ -7,13 +7,20 @@ import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import CELL, swept
-from tactile_bayes.assessment.causes import causes
+from tactile_bayes.assessment.causes import causes, causes_beside
+from tactile_bayes.assessment.local_bends import PLACES, LocalBends, with_bends
+from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.contours import Parabola
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.likely_causes import likely_causes
 from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.contour_problem import contour_problem
+from tactile_bayes.inference.deadline import Deadline
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.result import read_result, write_result
+from tactile_bayes.inference.starts.contour_optimum import first_order, optimum_beside
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
@@ -76,6 +83,61 @@ def test_readings_that_stand_out_are_named_where_the_model_describes_all_others(
     posterior = infer_contour(record, rig=Rig(load_cell=CELL), rng=1, settings=BRIEF)
     posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
     assert "degrees_of_freedom = 4" in likely_causes(posterior)
+
+
+def parabola(rig, **more):
+    """An experiment with a record of the parabola, and the parameters of the truth."""
+    record = CELL.measure(scan(SHAPE, Rig(), drive_step=0.03).record, rng=1)
+    return Experiment(record, rig), {"a": SHAPE.a, "q": SHAPE.q, "x_c": 0.0, **more}
+
+
+def test_a_spot_changes_the_radius_of_curvature_at_its_place_alone():
+    family = LocalBends(family_named("parabola"), (0.4,))
+    assert family.parameters == ("bend_1", "a", "q", "x_c")
+    drawn, slopes = family.build(np.array([0.0, np.log(2.0)]), 0.5, 0.3, 0.1), np.array([[-0.6], [0.4]])
+    radius = SHAPE.radius_of_curvature(slopes) * [[1.0, 1.0], [1.0, 2.0]]
+    np.testing.assert_allclose(drawn.radius_of_curvature(slopes), radius, rtol=1e-3)  # a parabola has none upright
+    np.testing.assert_allclose(drawn.point(0.0), [[0.1, 0.1], [0.3, 0.3]], atol=1e-12)
+
+
+def test_of_a_right_record_no_unknown_explains_more_than_its_price():
+    experiment, truth = parabola(Rig(load_cell=CELL, unknown="nothing"))
+    model = contour_problem(experiment).model
+    best = optimum_beside(model, [truth])
+    start = dict(zip(model.names, best.point.tolist(), strict=True))
+    bent = with_bends(model, PLACES)
+    bends = bent.forward_parameters[: len(PLACES)]
+    found = first_order(bent, start | dict.fromkeys(bends, 0.0), [[bend] for bend in bends])
+    assert max(one.log_evidence for one in found) < np.log(len(PLACES))  # a false alarm of one in a thousand or less
+
+
+@pytest.mark.slow
+def test_of_a_right_record_no_cause_is_named():
+    found = causes_beside(*parabola(Rig(load_cell=CELL, unknown="nothing")))
+    assert found.attrs["described"] == 1
+    assert likely_causes(xr.DataTree.from_dict({"causes": found})) == ""
+
+
+def test_causes_for_which_there_was_no_time_are_named():
+    found = causes_beside(*parabola(Rig(load_cell=CELL, unknown="nothing")), Deadline.after(0.0))
+    assert {"friction", "lag", "family shape-free"} <= set(found.attrs["no_time_for"].split(", "))
+    assert not found.sought.any()
+    said = likely_causes(xr.DataTree.from_dict({"causes": found}))
+    assert found.attrs["no_time_for"] in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("factor", "kind"), [(4.0, "flat spot"), (0.1, "corner")])
+def test_a_spot_of_the_contour_is_named_with_its_place(factor, kind):
+    contour = Misspecification(flat_spot=(0.2, factor)).contour(SHAPE.broadcast_to((1,)))
+    record = CELL.measure(scan(contour.take(np.array(0)), Rig(), drive_step=0.03).record, rng=1)
+    best = {"a": SHAPE.a, "q": SHAPE.q, "x_c": 0.0}
+    found = causes_beside(Experiment(record, Rig(load_cell=CELL)), best)
+    name, _, place = str(found.cause.values[0]).partition(" at x = ")
+    assert name == kind
+    begins, ends = contour.point(np.array([0.0, 0.4]))[0]
+    assert begins <= float(place) <= ends
+    assert "shape-free" in str(found.remedy.values[0]) or "flat-sided" in str(found.remedy.values[0])
 
 
 def group(*rows):

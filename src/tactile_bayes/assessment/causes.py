@@ -2,37 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.assessment.assumptions import Alternative, alternatives_by_channel, alternatives_of, stated_cell
-from tactile_bayes.diagnostics.findings import Finding
+from tactile_bayes.assessment.local_bends import PLACES, LocalBends, with_bends
+from tactile_bayes.diagnostics.findings import Finding, quantity
 from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.deadline import Deadline
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.result import best_draw
-from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optimum_beside
+from tactile_bayes.inference.starts.contour_optimum import cost_of_residuals, first_order, optimum_beside
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
-from tactile_bayes.record import rod_of
+from tactile_bayes.record import COLUMNS, rod_of
 from tactile_bayes.record.rig_entry import rig_entries
 from tactile_bayes.rig.stated import stated_values
 
-_SECONDS = 120.0  # time limit of all searches [s], most of which take one or two
+COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
+_SECONDS = 120.0  # time limit of all searches [s], each of which takes about one
+# Least number of causes that are sought by a search, the likeliest to first order first; beyond them searches go on
+# until one describes the record.
+_FEWEST = 4
+_MOST = 0.5  # least share of what any shape explains that one spot explains, to be named in its place
+_PRICE = float(np.log(len(PLACES)))  # of the places at which a spot is sought, in log-evidence
+_SHAPE_FREE, _FLAT_SIDED = "family shape-free", "family flat-sided"
 
 
 def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     """Try what may be wrong with the rig or the family of a posterior that does not describe its record.
 
-    Each unknown of the rig that is not inferred is added, and each other family taken, and the most probable parameters
-    are sought again, without sampling. It takes one or two seconds for each, and two minutes at most.
+    Each unknown of the rig that is not inferred is added, a spot that is flatter or more bent is put anywhere along the
+    contour, and each other family is taken. First all are judged by score tests, the derivatives of the loads at the
+    most probable parameters, in milliseconds; then of the likeliest the most probable parameters are sought again,
+    about a second each, until one describes the record, for two minutes at most. Nothing is sampled.
 
     Parameters
     ----------
@@ -46,9 +59,10 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     xr.Dataset
         Over "cause", those that describe the record first, then by log_evidence, above that of the model as it is, by
         Laplace's approximation for the noise as it is estimated from the record; describes, 1 if the rest is no more
-        than that noise; and remedy, the entries of rig.toml, or the family. If single samples fit no contact until a
-        column is read otherwise (another sign, say), or the model describes all but some readings that stand out,
-        nothing is tried, and the attribute misread is what `inspect_record` says of it.
+        than that noise; sought, 0 if the log-evidence is of the score test alone; and remedy, the entries of rig.toml,
+        or the family. The attribute no_time_for names those that were not sought for lack of time. If single samples
+        fit no contact until a column is read otherwise (another sign, say), or the model describes all but some
+        readings that stand out, nothing is tried, and the attribute misread is what `inspect_record` says of it.
 
     Raises
     ------
@@ -72,36 +86,144 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     >>> causes(wrong, rng=1).cause.values[0]
     'friction'
     """
-    experiment, seed = experiment_of(posterior), seed_sequence(rng)
-    stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
+    seed_sequence(rng)
     drawn = {str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}
-    starts = [{**stated, **drawn}, drawn]  # what is added as stated, and at its prior's median
+    return causes_beside(experiment_of(posterior), drawn)
+
+
+def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: Deadline | None = None) -> xr.Dataset:
+    """Return the `causes` of an experiment beside its most probable parameters."""
     seen = inspect_record(experiment.record, experiment.rig)
     if misread := [finding for finding in seen.messages if _is_misread(finding)]:
         return _of_readings(misread[:1])
-    deadline = Deadline.after(_SECONDS)
-    own = _optimum(experiment, starts, seed, deadline)
-    if own.fits and (outliers := [finding for finding in seen.messages if finding.kind == "outlier"]):
+    tests = _Tests(experiment, found, deadline or Deadline.after(_SECONDS))
+    if tests.own.fits and (outliers := [finding for finding in seen.messages if finding.kind == "outlier"]):
         return _of_readings(outliers)  # its optimum bears them, and the posterior does not
+    every = [each for each in alternatives_of(experiment, seen) if each.kind != "fixed"]
+    shape, spot = tests.any_shape()
+    rows = tests.sought(tests.judged([each for each in every if each.kind == "added"]) + shape)
+    if any(row.is_shape for row in rows[:2]):
+        rows = [tests.placed(row, spot) if row.is_shape else row for row in rows]
+        rows += tests.sought(tests.judged([e for e in every if e.kind == "family" and e.name != _SHAPE_FREE]))
+    leading = [f"{row.name} inferred" for row in rows[:2]]
+    rows += tests.sought(tests.judged(alternatives_by_channel(experiment, leading)))
+    rows.sort(key=lambda row: row.rank)
+    columns = {name: ("cause", [getattr(row, name) for row in rows]) for name in COLUMNS_OF_CAUSES}
+    attrs = {"described": int(tests.own.fits), "no_time_for": ", ".join(tests.missed)}
+    return xr.Dataset(columns, coords={"cause": [row.name for row in rows]}, attrs=attrs)
 
-    def tried(alternatives: list[Alternative]) -> Iterator[tuple[Alternative, ContourOptimum]]:
+
+@dataclass(frozen=True)
+class _Cause:
+    """What may be wrong, and what it explains, to first order until it is sought."""
+
+    name: str
+    remedy: str
+    log_evidence: float  # above that of the model as it is
+    model: ContourModel
+    starts: list[dict[str, float]]
+    is_shape: bool = False
+    # Cost of the model as it is where this one takes more samples, or another estimate of their noise, less its own.
+    more: float = 0.0
+    describes: int = 0  # 1 if it leaves no more than noise
+    point: Floats | None = None  # the optimum, if it was sought
+
+    @property
+    def sought(self) -> int:
+        """1 if the optimum was sought, else 0."""
+        return int(self.point is not None)
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        return not self.describes, -self.log_evidence
+
+
+class _Tests:
+    """Tests of what may be wrong with an experiment, beside its most probable parameters by name."""
+
+    def __init__(self, experiment: Experiment, found: Mapping[str, float], deadline: Deadline) -> None:
+        self.experiment, self.deadline = experiment, deadline
+        self.missed: list[str] = []  # names of those that were not sought for lack of time
+        self.model = contour_problem(experiment).model
+        stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
+        of_contour = {name: found[name] for name in self.model.family.parameters}
+        self.own = optimum_beside(self.model, [found, of_contour], deadline)  # a wrong model may have a far-off rig
+        best = dict(zip(self.model.names, self.own.point.tolist(), strict=True))
+        self.starts = [{**stated, **best}, {**stated, **found}, best]  # what is added as stated, and at its median
+
+    def judged(self, alternatives: list[Alternative]) -> list[_Cause]:
+        """Return alternatives, judged to first order where they add numbers; others have infinite evidence."""
+        causes = []
         for each in alternatives:
             with suppress(TactileBayesError):  # what cannot be tried is no cause
-                yield each, _optimum(each.experiment, starts, seed, deadline)
+                model, starts, gain = contour_problem(each.experiment).model, self.starts, np.inf
+                added = [name for name in model.forward_parameters if name not in self.model.forward_parameters]
+                if added and each.kind == "added":
+                    start = dict(starts[0])
+                    for name in set(self.model.forward_parameters) - set(model.forward_parameters):
+                        start |= dict.fromkeys(added, start[name])  # gains in place of the scale of rigidity
+                    (step,) = first_order(model, start, [added])
+                    gain, starts = step.log_evidence, [step.start, *starts]
+                name, is_shape = each.name.replace(" inferred", ""), each.kind == "family"
+                more = 0.0
+                if not np.array_equal(model.deviations, self.model.deviations):
+                    more = cost_of_residuals(model, self.starts[0]) - cost_of_residuals(self.model, self.starts[0])
+                causes.append(_Cause(name, _remedy(each, self.experiment), gain, model, starts, is_shape, more))
+        return causes
 
-    found = [*tried([each for each in alternatives_of(experiment, seen) if each.kind != "fixed"])]
-    better = [each.name for each, one in found if one.log_evidence > own.log_evidence]
-    found += tried(alternatives_by_channel(experiment, better))
-    found.sort(key=lambda one: (not one[1].fits, -one[1].log_evidence))
-    return xr.Dataset(
-        {
-            "log_evidence": ("cause", [one.log_evidence - own.log_evidence for _, one in found]),
-            "describes": ("cause", [int(one.fits) for _, one in found]),
-            "remedy": ("cause", [_remedy(each, experiment) for each, _ in found]),
-        },
-        coords={"cause": [each.name.replace(" inferred", "") for each, _ in found]},
-        attrs={"described": int(own.fits)},
-    )
+    def any_shape(self) -> tuple[list[_Cause], list[_Cause]]:
+        """Return any smooth shape, judged by spots everywhere, and a spot at the likeliest place; maybe none."""
+        experiment, start = self.experiment, self.starts[0]
+        if experiment.gauge is not None or experiment.own_family.name == "flat-sided":
+            return [], []
+        name = "flat-sided" if experiment.own_family.name == "shape-free" else "shape-free"
+        found = self.judged([Alternative(f"family {name}", "family", replace(experiment, family=name))])
+        model = with_bends(self.model, PLACES)
+        bends = model.forward_parameters[: len(PLACES)]
+        *each, together = first_order(model, start | dict.fromkeys(bends, 0.0), [*([bend] for bend in bends), bends])
+        best = int(np.argmax([one.log_evidence for one in each]))
+        place, moved = PLACES[best], each[best].start
+        gain = each[best].log_evidence - _PRICE
+        start = moved | {bends[0]: moved[bends[best]]}
+        spot = _Cause("a flat spot or corner", "", gain, with_bends(self.model, (place,)), [start])
+        return [replace(one, log_evidence=together.log_evidence) for one in found], [spot]
+
+    def placed(self, shape: _Cause, spots: list[_Cause]) -> _Cause:
+        """Return any smooth shape, or a flat-sided one if only that describes the record, by the name of the spot."""
+        for spot in self.sought(spots):
+            if spot.point is None:
+                continue
+            is_flat = bool(spot.point[0] > 0.0)
+            if is_flat and not shape.describes and shape.name == _SHAPE_FREE:
+                flat = Alternative(_FLAT_SIDED, "family", replace(self.experiment, family="flat-sided"))
+                shape = next((row for row in self.sought(self.judged([flat])) if row.describes), shape)
+            gain = spot.log_evidence - _PRICE
+            if gain > _MOST * shape.log_evidence > 0.0:
+                family = spot.model.family
+                assert isinstance(family, LocalBends)
+                x, _ = spot.model.contours(spot.point[None]).point(family.places[0])
+                place = quantity(float(x[0]), COLUMNS["base_x"].unit_in(self.experiment.record.attrs["units"]))
+                if spot.describes:
+                    shape = replace(shape, log_evidence=max(gain, shape.log_evidence))
+                return replace(shape, name=f"{'flat spot' if is_flat else 'corner'} at x = {place}")
+        return shape
+
+    def sought(self, causes: list[_Cause]) -> list[_Cause]:
+        """Return causes with their optima, the likeliest to first order first, until those left are less likely."""
+        rows: list[_Cause] = []
+        for number, each in enumerate(sorted(causes, key=lambda one: -one.log_evidence)):
+            known = max((row.log_evidence for row in rows if row.describes), default=-np.inf)
+            if self.deadline.has_passed:
+                self.missed.append(each.name)
+            elif number < _FEWEST or known <= each.log_evidence or not np.isfinite(known):
+                with suppress(TactileBayesError):
+                    found = optimum_beside(each.model, each.starts, self.deadline)
+                    gain = found.log_evidence - self.own.log_evidence + each.more
+                    rows.append(replace(each, log_evidence=gain, describes=int(found.fits), point=found.point))
+                continue
+            if np.isfinite(each.log_evidence):
+                rows.append(each)
+        return sorted(rows, key=lambda row: row.rank)
 
 
 def _is_misread(finding: Finding) -> bool:
@@ -112,14 +234,8 @@ def _is_misread(finding: Finding) -> bool:
 
 def _of_readings(findings: list[Finding]) -> xr.Dataset:
     """Return causes of which none is sought, since readings are wrong."""
-    none: dict[str, Any] = {name: ("cause", []) for name in ("log_evidence", "describes", "remedy")}
+    none: dict[str, Any] = {name: ("cause", []) for name in COLUMNS_OF_CAUSES}
     return xr.Dataset(none, attrs={"misread": " ".join(findings)})
-
-
-def _optimum(
-    experiment: Experiment, starts: list[dict[str, float]], seed: np.random.SeedSequence, deadline: Deadline
-) -> ContourOptimum:
-    return optimum_beside(contour_problem(experiment).model, starts, np.random.default_rng(seed), deadline)
 
 
 def _remedy(alternative: Alternative, experiment: Experiment) -> str:

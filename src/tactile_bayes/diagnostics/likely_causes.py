@@ -19,6 +19,13 @@ def likely_causes(posterior: xr.DataTree) -> str:
     causes = posterior["causes"].to_dataset()
     if "misread" in causes.attrs:
         return str(causes.attrs["misread"])
+    said, missed = _said(causes), str(causes.attrs.get("no_time_for", ""))
+    if not missed:
+        return said
+    return f"{said or 'Nothing that was tried describes it better.'} No time for: {missed}."
+
+
+def _said(causes: xr.Dataset) -> str:
     gains = causes.log_evidence.values
     order = np.flatnonzero(gains > _GAIN)
     if not order.size:

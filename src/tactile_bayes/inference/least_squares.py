@@ -12,7 +12,8 @@ from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.numerics.differences import central_slopes
 
 Residuals = Callable[[Floats], Floats]
-_HUBER_THRESHOLD = 2.0  # residual, in standard deviations, beyond which the loss of the final search grows linearly
+HUBER_THRESHOLD = 2.0  # residual, in standard deviations, beyond which the loss of the final search grows linearly
+STEP = 1e-4  # of central differences, in prior spreads; it must not be too small for interpolated loads
 _THRESHOLD_FACTOR = 0.2  # from one search to the next; the first threshold is the root mean square of residuals
 _MOST_EVALUATIONS = 40  # of the residuals in a search
 # Relative change of cost or point below which a search ends: the final one, and those before it.
@@ -87,8 +88,8 @@ def descend(
         return np.append(residuals((point * spread)[None])[0], point - middle / spread)
 
     def jacobian(point: Floats) -> Floats:
-        """Return central differences, whose step must not be too small for interpolated loads."""
-        slopes = central_slopes(lambda points: residuals(points * spread), point, 1e-4)
+        """Return central differences."""
+        slopes = central_slopes(lambda points: residuals(points * spread), point, STEP)
         return np.concatenate([slopes, np.eye(point.size)])
 
     def loss(squares: Floats) -> Any:
@@ -101,10 +102,10 @@ def descend(
 
     bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
     point, scale, robust = start / spread, np.inf, cast(Any, loss)
-    while scale > _HUBER_THRESHOLD:  # far from the optimum a quadratic loss converges faster
+    while scale > HUBER_THRESHOLD:  # far from the optimum a quadratic loss converges faster
         typical = float(np.sqrt(np.mean(np.square(one(point)))))
-        scale = max(_HUBER_THRESHOLD, min(typical, _THRESHOLD_FACTOR * scale))
-        tolerance = _FINAL_TOLERANCE if scale == _HUBER_THRESHOLD else _EARLY_TOLERANCE
+        scale = max(HUBER_THRESHOLD, min(typical, _THRESHOLD_FACTOR * scale))
+        tolerance = _FINAL_TOLERANCE if scale == HUBER_THRESHOLD else _EARLY_TOLERANCE
         solution = deadline.least_squares(
             one,
             point,

@@ -143,8 +143,9 @@ def _causes_table(findings: Findings) -> PageTable | None:
     if "misread" in causes.attrs:
         return None
     rows = [
-        [name, fixed(gain, ".0f"), "yes" if describes else "no", remedy]
-        for name, gain, describes, remedy in rows_of(causes, "cause", "log_evidence", "describes", "remedy")
+        [name, fixed(gain, ".0f"), ("yes" if describes else "no") if sought else "not tried", remedy]
+        for name, *row in rows_of(causes, "cause", "log_evidence", "describes", "sought", "remedy")
+        for gain, describes, sought, remedy in [row]
     ]
     return PageTable("What may be wrong", ["cause", "log-evidence", "describes the record", "infer with"], rows)
 

@@ -13,8 +13,9 @@ from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.least_squares import Optimum, descend, optima
+from tactile_bayes.inference.least_squares import HUBER_THRESHOLD, STEP, Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
+from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels
@@ -22,6 +23,8 @@ from tactile_bayes.rig.corrected import corrected
 from tactile_bayes.rig.parameters import GROUPS
 
 _PRIOR_DRAWS = 1000
+_PRIOR_QUANTILES = 25
+_FARTHEST = 2.0  # longest step to first order, in prior standard deviations of a parameter
 # Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
 # early, since a sample at an event is loaded or not.
 _CANDIDATES = 24
@@ -107,16 +110,16 @@ def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline
 
 def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
     """Yield optima that start from a contour fitted to Step 2's contacts, and from prior draws, the likeliest first."""
-    search = _Search(model, rng, deadline)
+    search = _Search(model, model.draw_prior(rng, _PRIOR_DRAWS, deadline)[0], deadline)
     for found in optima(search.residuals, search.starts(), *search.limits):
         yield search.complete(search.refine(found))
 
 
 def optimum_beside(
-    model: ContourModel, starts: Sequence[Mapping[str, float]], rng: np.random.Generator, deadline: Deadline = NEVER
+    model: ContourModel, starts: Sequence[Mapping[str, float]], deadline: Deadline = NEVER
 ) -> ContourOptimum:
-    """Return the best of the optima from Step 2's contacts and, for a contour of its family, from starts by name."""
-    search = _Search(model, rng, deadline)
+    """Return the best of the optima from starts by name, for a contour of its family, and from Step 2's contacts."""
+    search = _Search(model, _prior_quantiles(model), deadline)
     best: Optimum | None = None
     for found in optima(search.residuals, search.beside(starts), *search.limits):
         best = found if best is None or found.cost < best.cost else best
@@ -128,14 +131,72 @@ def optimum_beside(
 
 def smooth_optimum(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Floats:
     """Return the parameters of the best contour without roughness: a circle, with a flat side if the family has one."""
-    search = _Search(model, rng, deadline)
+    search = _Search(model, model.draw_prior(rng, _PRIOR_DRAWS, deadline)[0], deadline)
     return search.complete(search.smooth()).point
+
+
+def cost_of_residuals(model: ContourModel, start: Mapping[str, float]) -> float:
+    """Return the robust cost of a record's residuals at parameters by name."""
+    search, threshold = _Search(model, _prior_quantiles(model), NEVER), HUBER_THRESHOLD
+    residuals = search.residuals(search.coordinates.of(search.named(start)[None]))[0]
+    return float(threshold**2 * np.sum(np.hypot(1.0, residuals / threshold) - 1.0))
+
+
+class FirstOrder(NamedTuple):
+    """What a parameter that is added explains of a record, to first order, all others fitted again."""
+
+    log_evidence: float  # above that without the parameter, for the coarse noise
+    start: dict[str, float]  # parameters after the step, by name
+
+
+def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence[Sequence[str]]) -> list[FirstOrder]:
+    """Return what each group of added parameters explains beside a start, the optimum of the model without them.
+
+    With the score s of a group, and its information S, less what the other parameters explain, both in prior standard
+    deviations, it is ½ (sᵀ S⁻¹ s − log det S) by Laplace's approximation (Rao's score test, and its price).
+    """
+    search, names = _Search(model, _prior_quantiles(model), NEVER), model.forward_parameters
+    place = search.coordinates.of(search.named(start)[None])[0] / search.spread
+    slopes = central_slopes(lambda points: search.residuals(points * search.spread), place, STEP)
+    residuals, loose = search.residuals((place * search.spread)[None])[0], set().union(*added)
+    weight = 1.0 / np.sqrt(1.0 + np.square(residuals / HUBER_THRESHOLD))
+    precision = (slopes.T * weight) @ slopes + np.eye(place.size)
+    score = -(slopes.T * weight) @ residuals - (place - search.middle / search.spread)
+    own = [i for i, name in enumerate(names) if name not in loose]
+    vanishing, found = set(np.array(names)[model.may_vanish[: len(names)]]), []
+    for group in added:
+        which = [names.index(name) for name in group]
+        while True:
+            both = own + which
+            step = np.linalg.solve(precision[np.ix_(both, both)], score[both])
+            wrong = [i for i, move in zip(which, step[len(own) :], strict=True) if names[i] in vanishing and move < 0.0]
+            if not wrong:
+                break
+            which = [i for i in which if i not in wrong]
+        alone = np.linalg.solve(precision[np.ix_(own, own)], score[own])
+        gain = 0.5 * (score[both] @ step - score[own] @ alone)
+        price = 0.5 * (_log_det(precision[np.ix_(both, both)]) - _log_det(precision[np.ix_(own, own)]))
+        moved = place.copy()
+        moved[both] += np.clip(step, -_FARTHEST, _FARTHEST)
+        point = search.points((moved * search.spread)[None])[0]
+        found.append(FirstOrder(float(gain - price), dict(zip(names, point.tolist(), strict=True))))
+    return found
+
+
+def _log_det(matrix: Floats) -> float:
+    return float(np.linalg.slogdet(matrix).logabsdet)
+
+
+def _prior_quantiles(model: ContourModel) -> Floats:
+    """Return quantiles of the priors, each parameter's by itself, in place of draws, (quantiles, d)."""
+    shares = np.linspace(0.02, 0.98, _PRIOR_QUANTILES)
+    return model.prior_quantiles(np.tile(shares[:, None], len(model.names)))
 
 
 class _Search:
     """Least squares over the forward-model parameters, positive ones by their logarithms; noise from residuals."""
 
-    def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
+    def __init__(self, model: ContourModel, candidates: Floats, deadline: Deadline) -> None:
         self.model = model
         self.deadline = deadline
         size = len(model.forward_parameters)
@@ -147,7 +208,7 @@ class _Search:
         self.bias = bias / np.where(size_of_bias > 0.0, size_of_bias, 1.0)
         self.of_bias = 1.0 - 1.0 / np.hypot(1.0, size_of_bias)
         self.brackets = event_brackets(model)
-        self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
+        self.candidates = candidates.copy()
         for name, zero in _zeros(model).items():
             self.candidates[:, model.names.index(name)] = zero
         self.usual = np.median(self.candidates[:, :size], axis=0)
@@ -163,6 +224,11 @@ class _Search:
     def points(self, coordinates: Floats) -> Floats:
         """Return the forward-model parameters at coordinates, both of shape (n, parameters)."""
         return self.coordinates.parameters(coordinates)[0]
+
+    def named(self, start: Mapping[str, float]) -> Floats:
+        """Return the parameters of a start by name, medians for those that it does not name."""
+        pairs = zip(self.model.forward_parameters, self.usual.tolist(), strict=True)
+        return np.array([start.get(name, value) for name, value in pairs])
 
     def residuals(self, coordinates: Floats) -> Floats:
         """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too.
@@ -189,15 +255,14 @@ class _Search:
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
     def beside(self, starts: Sequence[Mapping[str, float]]) -> Iterator[Floats]:
-        """Yield coordinates of the contour fitted to Step 2's contacts, without and with the rig's medians, and of
-        starts, where medians stand for what they do not name."""
+        """Yield coordinates of starts, where medians stand for what they do not name, and of the contour fitted to Step
+        2's contacts, with the rig's medians and without."""
         rig = dict(zip(self.model.forward_parameters, self.usual.tolist(), strict=True))
-        for fitted in (self._at_contacts(), self._at_contacts(rig)):
-            if fitted is not None:
-                yield fitted
+        contacts = [fitted for fitted in (self._at_contacts(), self._at_contacts(rig)) if fitted is not None]
         for start in starts:
-            if fitted is None or set(self.model.family.parameters) <= set(start):
-                yield self.coordinates.of(np.array([start.get(name, value) for name, value in rig.items()]))
+            if not contacts or set(self.model.family.parameters) <= set(start):
+                yield self.coordinates.of(self.named(start))
+        yield from contacts
 
     def starts(self) -> Iterator[Floats]:
         """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""
