@@ -123,7 +123,7 @@ class _Cause:
     model: ContourModel
     starts: list[dict[str, float]]
     is_shape: bool = False
-    # Cost of the model as it is where this one takes more samples, or another estimate of their noise, less its own.
+    # Cost of the model as it is by the samples and events that one with a memory takes, less that by its own.
     more: float = 0.0
     describes: int = 0  # 1 if it leaves no more than noise
     point: Floats | None = None  # the optimum, if it was sought
@@ -166,7 +166,9 @@ class _Tests:
                     gain, starts = step.log_evidence, [step.start, *starts]
                 name, is_shape = each.name.replace(" inferred", ""), each.kind == "family"
                 more = 0.0
-                if not np.array_equal(model.deviations, self.model.deviations):
+                if model.unknowns.memory and not self.model.unknowns.memory:
+                    if model.likelihood.measured.shape == self.model.likelihood.measured.shape:
+                        model.deviation = self.model.deviation
                     more = cost_of_residuals(model, self.starts[0]) - cost_of_residuals(self.model, self.starts[0])
                 causes.append(_Cause(name, _remedy(each, self.experiment), gain, model, starts, is_shape, more))
         return causes
