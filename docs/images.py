@@ -1,6 +1,6 @@
 """Draw the figures of the pages into docs/images, except that of the demonstration: `python docs/images.py`.
 
-That of a real cylinder is one of `python -m benchmarks.whisker_sweeps RUN`.
+Those of a real cylinder and a real square are of `benchmarks.whisker_sweeps` and `benchmarks.whisker_square`.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks import whisker_sweeps
+import xarray as xr
+from benchmarks import whisker_square, whisker_sweeps
 from scipy.optimize import least_squares
 
 import tactile_bayes as tb
@@ -83,3 +84,14 @@ def test_a_cylinder_of_15_mm_is_found(rigs, trial):
     found = least_squares(left, [12.0, -13.0, 0.0, 0.0], x_scale=[1.0, 1.0, 1.0, 10.0], diff_step=1e-4)
     assert np.sqrt(np.mean(found.fun**2)) < 6.0
     assert found.x[0] == pytest.approx(15.0, abs=1.0)
+
+
+def test_a_drawing_is_within_a_band_of_itself():
+    x = np.linspace(-4e-3, 12e-3, 41)
+    slope = np.where(
+        x < whisker_square.RADIUS * np.sqrt(0.5), np.arcsin(np.minimum(x / whisker_square.RADIUS, 0.7)), np.pi / 4
+    )
+    band = xr.Dataset({"y": ("x", whisker_square.drawing(x)), "slope_angle": ("x", slope)}, coords={"x": x})
+    np.testing.assert_allclose(whisker_square.distances(band, np.zeros(2)), 0.0, atol=1e-9)
+    off = whisker_square.distances(band, np.array([0.0, 1e-4]))
+    np.testing.assert_allclose(off, 1e-4 * np.cos(slope), atol=5e-7)
