@@ -286,7 +286,7 @@ class _Search:
         family, names = self.model.family, self.model.forward_parameters
         free = [i for i, name in enumerate(names) if name in family.parameters and name not in family.roughness]
         usual = self.coordinates.of(self.usual)
-        usual[np.char.startswith(names, "z_")] = 0.0
+        usual[[i for i, name in enumerate(names) if name.startswith("z_")]] = 0.0
 
         def whole(some: Floats) -> Floats:
             every = np.tile(usual, (len(some), 1))
@@ -301,12 +301,12 @@ class _Search:
 
         drawn = self.drawn[:, free]
         costs = np.sum(np.minimum(np.abs(residuals(drawn)), 30.0), axis=1)
-        limits = [limit[free] for limit in self.limits[:-1]]
+        middle, spread, low, high = (limit[free] for limit in self.limits[:4])
         best: Optimum | None = None
         for place in drawn[np.argsort(costs)[:_SMOOTH_STARTS]]:
             if self.brackets.low.size:
-                place = descend(missed, place, *limits[:2], deadline=self.deadline).point
-            found = next(optima(residuals, [place], *limits, self.deadline))
+                place = descend(missed, place, middle, spread, deadline=self.deadline).point
+            found = next(optima(residuals, [place], middle, spread, low, high, self.deadline))
             best = found if best is None or found.cost < best.cost else best
         assert best is not None
         covariance = np.diag(np.square(self.spread))
