@@ -32,7 +32,7 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import expanded
 
-_STEPS_OF_A_VERDICT = 150  # of a posterior whose best parameters do not describe the record
+_STEPS_OF_A_VERDICT = 50  # of a posterior whose best parameters do not describe the record
 _PRIOR_SECONDS = 3.0  # time limit for draws from the prior [s] if time is limited, since a rod may reach few contours
 
 

@@ -149,9 +149,13 @@ class _Start(NamedTuple):
             modes = [mode.usual or mode for mode in modes]
         common = modes[0].coordinates
         target = in_coordinates(model.log_probability, common)
-        shares = Mixture(tuple(mode.proposal for mode in modes)).shares
-        refined_ones = (refined(target, mode.proposal, rng, deadline) for mode in modes)
-        proposal = Mixture(tuple(part for each in refined_ones for part in each.parts))
+        first = modes[0].optimum
+        is_hopeless = _is_hopeless(model, first)
+        proposal = Mixture(tuple(mode.proposal for mode in modes))
+        shares = proposal.shares
+        if not is_hopeless:  # else a verdict does not need it
+            refined_ones = (refined(target, mode.proposal, rng, deadline) for mode in modes)
+            proposal = Mixture(tuple(part for each in refined_ones for part in each.parts))
 
         def draw(rng: np.random.Generator, count: int) -> Floats:
             counts = rng.multinomial(count, shares)
@@ -168,13 +172,11 @@ class _Start(NamedTuple):
                 floor=lambda: min(mode.cloud.floor_by(deadline) for mode in modes),
             )
         except InferenceError as error:
-            point = modes[0].optimum.point
-            best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
+            best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, first.point, strict=False))
             raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
         coordinates = replace(common, proposal=proposal)
         log_evidence = float(logsumexp([part.log_mass for part in proposal.parts]))
-        first = modes[0].optimum
-        return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, _is_hopeless(model, first))
+        return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, is_hopeless)
 
 
 def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:
