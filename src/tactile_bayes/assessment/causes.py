@@ -105,8 +105,8 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     if any(row.is_shape for row in rows[:2]):
         rows = [tests.placed(row, spot) if row.is_shape else row for row in rows]
         rows += tests.sought(tests.judged([e for e in every if e.kind == "family" and e.name != _SHAPE_FREE]))
-    leading = [f"{row.name} inferred" for row in rows[:2]]
-    rows += tests.sought(tests.judged(alternatives_by_channel(experiment, leading)))
+    better = [f"{row.name} inferred" for row in rows if row.log_evidence > 0.0]
+    rows += tests.sought(tests.judged(alternatives_by_channel(experiment, better)))
     rows.sort(key=lambda row: row.rank)
     columns = {name: ("cause", [getattr(row, name) for row in rows]) for name in COLUMNS_OF_CAUSES}
     attrs = {"described": int(tests.own.fits), "no_time_for": ", ".join(tests.missed)}
