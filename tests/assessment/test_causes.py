@@ -133,11 +133,14 @@ def test_a_spot_of_the_contour_is_named_with_its_place(factor, kind):
     record = CELL.measure(scan(contour.take(np.array(0)), Rig(), drive_step=0.03).record, rng=1)
     best = {"a": SHAPE.a, "q": SHAPE.q, "x_c": 0.0}
     found = causes_beside(Experiment(record, Rig(load_cell=CELL)), best)
-    name, _, place = str(found.cause.values[0]).partition(" at x = ")
-    assert name == kind
+    parted = [name.partition(" at x = ") for name in found.cause.values.tolist()]
+    (k,) = [k for k, (of, *_) in enumerate(parted) if of == kind]
+    place = parted[k][2]
+    assert found.describes[k]
+    assert found.log_evidence[k] > found.log_evidence[0] - 5.0  # two joined power laws make nearly the same spot
     begins, ends = contour.point(np.array([0.0, 0.4]))[0]
     assert begins <= float(place) <= ends
-    assert "shape-free" in str(found.remedy.values[0]) or "flat-sided" in str(found.remedy.values[0])
+    assert str(found.remedy.values[k]) in ("--family shape-free", "--family flat-sided")
 
 
 def group(*rows):
