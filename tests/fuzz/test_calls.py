@@ -27,7 +27,8 @@ NOT_CALLED = {
     "TaskProgress",
     *(f"elastica.{name}" for name in ("Contact", "Wrench")),
 }
-OF_ANY_NAME = ("Family", "Family.only", "Rig.with_session", "Rig.with_unknown")  # what takes parameters of a contour or a rig by name
+# What takes parameters of a contour or a rig by name.
+OF_ANY_NAME = ("Family", "Family.only", "Rig.with_session", "Rig.with_unknown")
 pytestmark = pytest.mark.usefixtures("before_sampling")
 
 MOST_OBSCURE = 0.02  # largest share of wrong calls that end in an error of another library
