@@ -177,14 +177,6 @@ def is_before_record(line: Line | None, travel: float) -> bool:
 
 
 @compiled
-def only_turns(line: Line | None) -> bool:
-    """True if the base rests."""
-    if line is None:
-        return True
-    return line.along.x == 0.0 and line.along.y == 0.0
-
-
-@compiled
 def drive_angle_at(line: Line | None, travel: float) -> float:
     """Drive angle at a travel, which is the angle itself in a rotation."""
     if line is None:
