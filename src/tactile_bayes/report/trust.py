@@ -142,10 +142,10 @@ def _causes_table(findings: Findings) -> PageTable | None:
     causes = findings.posterior["causes"].to_dataset()
     if "misread" in causes.attrs:
         return None
+    columns = ("cause", "log_evidence", "describes", "sought", "remedy")
     rows = [
         [name, fixed(gain, ".0f"), ("yes" if describes else "no") if sought else "not tried", remedy]
-        for name, *row in rows_of(causes, "cause", "log_evidence", "describes", "sought", "remedy")
-        for gain, describes, sought, remedy in [row]
+        for name, gain, describes, sought, remedy in rows_of(causes, *columns)
     ]
     return PageTable("What may be wrong", ["cause", "log-evidence", "describes the record", "infer with"], rows)
 
