@@ -139,7 +139,7 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
         replicate = make_replicate(experiment, number, throw=True)
         found = trust(replicate.posterior, rng=1, replicates=0, assumptions=False)
         numbers = replicate.outcome.numbers
-        named = [] if numbers["check_passed"] else causes(replicate.posterior, rng=1).cause.values.tolist()
+        named = [] if numbers["check_passed"] else causes(replicate.posterior).cause.values.tolist()
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
     wholes = [numbers.get(f"simultaneous_{region}", math.nan) for region in ("in_gap", "beside")]

@@ -66,7 +66,7 @@ def test_a_column_that_is_read_with_another_sign_is_named_and_nothing_else_is_tr
     record = swept(SHAPE, step=0.03)
     record["force_x"] = -record["force_x"]
     posterior = infer_contour(CELL.measure(record, rng=1), rig=Rig(load_cell=CELL), rng=1, settings=BRIEF)
-    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    posterior["causes"] = xr.DataTree(causes(posterior))
     write_result(posterior, tmp_path / "posterior.nc")
     read = read_result(tmp_path / "posterior.nc")
     assert read["causes"].sizes["cause"] == 0
@@ -81,7 +81,7 @@ def test_readings_that_stand_out_are_named_where_the_model_describes_all_others(
     record = replace(CELL, degrees_of_freedom=2.0).measure(swept(SHAPE, step=0.03), rng=1)
     record.attrs = {name: value for name, value in record.attrs.items() if not name.startswith("load_cell_")}
     posterior = infer_contour(record, rig=Rig(load_cell=CELL), rng=1, settings=BRIEF)
-    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    posterior["causes"] = xr.DataTree(causes(posterior))
     assert "degrees_of_freedom = 4" in likely_causes(posterior)
 
 
@@ -170,7 +170,7 @@ def test_what_is_said_of_causes(rows, named, unnamed):
 def test_a_check_names_the_cause_in_place_of_a_list():
     posterior = inferred(Rig(load_cell=CELL, unknown={"friction": 0.5}), unknown="nothing")
     (finding,) = (one for one in check(posterior).messages if one.kind == "not described")
-    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    posterior["causes"] = xr.DataTree(causes(posterior))
     (with_cause,) = (one for one in check(posterior).messages if one.kind == "not described")
     assert 'friction = "default"' in with_cause.details["advice"] != finding.details["advice"]
 
@@ -178,6 +178,6 @@ def test_a_check_names_the_cause_in_place_of_a_list():
 @pytest.mark.slow
 def test_a_rod_is_no_cause_where_nothing_is_wrong():
     posterior = inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0}))
-    posterior["causes"] = xr.DataTree(causes(posterior, rng=1))
+    posterior["causes"] = xr.DataTree(causes(posterior))
     assert posterior["causes"].attrs["described"] == 1
     assert likely_causes(posterior) == ""

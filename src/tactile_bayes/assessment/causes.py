@@ -24,7 +24,6 @@ from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.result import best_draw
 from tactile_bayes.inference.starts.contour_optimum import cost_of_residuals, first_order, optimum_beside
 from tactile_bayes.inference.stored_experiment import experiment_of
-from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.record import COLUMNS, rod_of
 from tactile_bayes.record.rig_entry import rig_entries
 from tactile_bayes.rig.stated import stated_values
@@ -39,7 +38,7 @@ _PRICE = float(np.log(len(PLACES)))  # of the places at which a spot is sought, 
 _SHAPE_FREE, _FLAT_SIDED = "family shape-free", "family flat-sided"
 
 
-def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
+def causes(posterior: xr.DataTree) -> xr.Dataset:
     """Try what may be wrong with the rig or the family of a posterior that does not describe its record.
 
     Each unknown of the rig that is not inferred is added, a spot that is flatter or more bent is put anywhere along the
@@ -51,8 +50,6 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     ----------
     posterior : xr.DataTree
         From `infer_contour`.
-    rng : int, numpy.random.SeedSequence or numpy.random.Generator
-        Random numbers.
 
     Returns
     -------
@@ -83,10 +80,9 @@ def causes(posterior: xr.DataTree, *, rng: Rng) -> xr.Dataset:
     >>> measured = cell.measure(scan(paper_profile("III", q=0.5), real, drive_step=0.05).record, rng=1)
     >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=50)
     >>> wrong = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=1, settings=quick)
-    >>> causes(wrong, rng=1).cause.values[0]
+    >>> causes(wrong).cause.values[0]
     'friction'
     """
-    seed_sequence(rng)
     drawn = {str(name): float(value) for name, value in best_draw(posterior).data_vars.items()}
     return causes_beside(experiment_of(posterior), drawn)
 
@@ -173,11 +169,11 @@ class _Tests:
                 causes.append(_Cause(name, _remedy(each, self.experiment), gain, model, starts, is_shape, more))
         return causes
 
-    def any_shape(self) -> tuple[list[_Cause], list[_Cause]]:
-        """Return any smooth shape, judged by spots everywhere, and a spot at the likeliest place; maybe none."""
+    def any_shape(self) -> tuple[list[_Cause], _Cause | None]:
+        """Return any smooth shape, judged by spots everywhere, and a spot at the likeliest place; maybe neither."""
         experiment, start = self.experiment, self.starts[0]
         if experiment.gauge is not None or experiment.own_family.name == "flat-sided":
-            return [], []
+            return [], None
         name = "flat-sided" if experiment.own_family.name == "shape-free" else "shape-free"
         found = self.judged([Alternative(f"family {name}", "family", replace(experiment, family=name))])
         model = with_bends(self.model, PLACES)
@@ -188,27 +184,27 @@ class _Tests:
         gain = each[best].log_evidence - _PRICE
         start = moved | {bends[0]: moved[bends[best]]}
         spot = _Cause("a flat spot or corner", "", gain, with_bends(self.model, (place,)), [start])
-        return [replace(one, log_evidence=together.log_evidence) for one in found], [spot]
+        return [replace(one, log_evidence=together.log_evidence) for one in found], spot
 
-    def placed(self, shape: _Cause, spots: list[_Cause]) -> _Cause:
+    def placed(self, shape: _Cause, spot: _Cause | None) -> _Cause:
         """Return any smooth shape, or a flat-sided one if only that describes the record, by the name of the spot."""
-        for spot in self.sought(spots):
-            if spot.point is None:
-                continue
-            is_flat = bool(spot.point[0] > 0.0)
-            if is_flat and not shape.describes and shape.name == _SHAPE_FREE:
-                flat = Alternative(_FLAT_SIDED, "family", replace(self.experiment, family="flat-sided"))
-                shape = next((row for row in self.sought(self.judged([flat])) if row.describes), shape)
-            gain = spot.log_evidence - _PRICE
-            if gain > _MOST * shape.log_evidence > 0.0:
-                family = spot.model.family
-                assert isinstance(family, LocalBends)
-                x, _ = spot.model.contours(spot.point[None]).point(family.places[0])
-                place = quantity(float(x[0]), COLUMNS["base_x"].unit_in(self.experiment.record.attrs["units"]))
-                if spot.describes:
-                    shape = replace(shape, log_evidence=max(gain, shape.log_evidence))
-                return replace(shape, name=f"{'flat spot' if is_flat else 'corner'} at x = {place}")
-        return shape
+        spot = next(iter(self.sought([spot] if spot else [])), None)
+        if spot is None or spot.point is None:
+            return shape
+        is_flat = bool(spot.point[0] > 0.0)
+        if is_flat and not shape.describes and shape.name == _SHAPE_FREE:
+            flat = Alternative(_FLAT_SIDED, "family", replace(self.experiment, family="flat-sided"))
+            shape = next((row for row in self.sought(self.judged([flat])) if row.describes), shape)
+        gain = spot.log_evidence - _PRICE
+        if not gain > _MOST * shape.log_evidence > 0.0:
+            return shape
+        family = spot.model.family
+        assert isinstance(family, LocalBends)
+        x, _ = spot.model.contours(spot.point[None]).point(family.places[0])
+        place = quantity(float(x[0]), COLUMNS["base_x"].unit_in(self.experiment.record.attrs["units"]))
+        if spot.describes:
+            shape = replace(shape, log_evidence=max(gain, shape.log_evidence))
+        return replace(shape, name=f"{'flat spot' if is_flat else 'corner'} at x = {place}")
 
     def sought(self, causes: list[_Cause]) -> list[_Cause]:
         """Return causes with their optima, the likeliest to first order first, until those left are less likely."""

@@ -185,7 +185,7 @@ def complete(
         if checked is not None and any(finding.kind == "not described" for finding in checked.messages):
             follow("what may be wrong, a second or two each")
             with folder.attempt("causes", "causes"):
-                result["causes"] = xr.DataTree(causes(result, rng=0))
+                result["causes"] = xr.DataTree(causes(result))
                 folder.write_posterior(result, [_POSTERIOR])
                 checked = check(result, contacts)
         numbers = summary(result, probability, edges)

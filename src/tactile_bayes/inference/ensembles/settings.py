@@ -57,7 +57,7 @@ class SamplerSettings:
 
     ensembles: int = 4
     walkers: int | None = None
-    block_steps: int = 50
+    block_steps: int = 25
     max_r_hat: float = 1.01
     min_ess: float = 1000.0
     max_steps: int | None = None
