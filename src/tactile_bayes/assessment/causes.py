@@ -33,6 +33,7 @@ _SECONDS = 120.0  # time limit of all searches [s], each of which takes about on
 # Least number of causes that are sought by a search, the likeliest to first order first; beyond them searches go on
 # until one describes the record.
 _FEWEST = 4
+_LEAST = 0.03  # share of the log-evidence of what describes the record below which, to first order, nothing is sought
 _MOST = 0.5  # least share of what any shape explains that one spot explains, to be named in its place
 _PRICE = float(np.log(len(PLACES)))  # of the places at which a spot is sought, in log-evidence
 _SHAPE_FREE, _FLAT_SIDED = "family shape-free", "family flat-sided"
@@ -98,7 +99,7 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     every = [each for each in alternatives_of(experiment, seen) if each.kind != "fixed"]
     shape, spot = tests.any_shape()
     rows = tests.sought(tests.judged([each for each in every if each.kind == "added"]) + shape)
-    if any(row.is_shape for row in rows[:2]):
+    if any(row.is_shape and row.log_evidence >= _LEAST * tests.known for row in rows[:2]):
         rows = [tests.placed(row, spot) if row.is_shape else row for row in rows]
         rows += tests.sought(tests.judged([e for e in every if e.kind == "family" and e.name != _SHAPE_FREE]))
     better = [f"{row.name} inferred" for row in rows if row.log_evidence > 0.0]
@@ -140,6 +141,7 @@ class _Tests:
     def __init__(self, experiment: Experiment, found: Mapping[str, float], deadline: Deadline) -> None:
         self.experiment, self.deadline = experiment, deadline
         self.missed: list[str] = []  # names of those that were not sought for lack of time
+        self.known = -np.inf  # largest log-evidence of those that describe the record
         self.model = contour_problem(experiment).model
         stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
         of_contour = {name: found[name] for name in self.model.family.parameters}
@@ -207,17 +209,18 @@ class _Tests:
         return replace(shape, name=f"{'flat spot' if is_flat else 'corner'} at x = {place}")
 
     def sought(self, causes: list[_Cause]) -> list[_Cause]:
-        """Return causes with their optima, the likeliest to first order first, until those left are less likely."""
+        """Return causes with their optima, the likeliest to first order first, unless others are far likelier."""
         rows: list[_Cause] = []
         for number, each in enumerate(sorted(causes, key=lambda one: -one.log_evidence)):
-            known = max((row.log_evidence for row in rows if row.describes), default=-np.inf)
+            least = _LEAST * self.known if number < _FEWEST else self.known
             if self.deadline.has_passed:
                 self.missed.append(each.name)
-            elif number < _FEWEST or known <= each.log_evidence or not np.isfinite(known):
+            elif each.log_evidence >= least:
                 with suppress(TactileBayesError):
                     found = optimum_beside(each.model, each.starts, self.deadline)
                     gain = found.log_evidence - self.own.log_evidence + each.more
                     rows.append(replace(each, log_evidence=gain, describes=int(found.fits), point=found.point))
+                    self.known = max(self.known, gain if found.fits else -np.inf)
                 continue
             if np.isfinite(each.log_evidence):
                 rows.append(each)

@@ -18,7 +18,8 @@ _THRESHOLD_FACTOR = 0.2  # from one search to the next; the first threshold is t
 _MOST_EVALUATIONS = 40  # of the residuals in a search
 # Relative change of cost or point below which a search ends: the final one, and those before it.
 _FINAL_TOLERANCE, _EARLY_TOLERANCE = 1e-4, 1e-2
-_GAIN = 1.0  # least gain in cost for which a search is repeated from where it ended
+# Least gain in cost for which a search is repeated from where it ended, or share of a cost that no noise explains.
+_GAIN, _SHARE = 1.0, 0.01
 _INSIDE = 1e-3  # distance from a bound at which a bounded search begins, over the scale of the parameter
 _FITS = 0.55  # cost per residual below which the noise explains the record: 0.4 if the estimate of the noise is right
 
@@ -55,7 +56,8 @@ def optima(
     for candidate in candidates:
         found = descend(residuals, candidate, middle, spread, deadline=deadline)
         gain = np.inf
-        while gain > _GAIN and not deadline.has_passed:  # samples may have crossed an event during the search
+        # Samples may have crossed an event during a search.
+        while gain > (_GAIN if found.fits else max(_GAIN, _SHARE * found.cost)) and not deadline.has_passed:
             again = descend(residuals, found.point, middle, spread, deadline=deadline)
             gain = found.cost - again.cost
             found = again if gain > 0.0 else found

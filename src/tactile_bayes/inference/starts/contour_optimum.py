@@ -40,6 +40,8 @@ _MIN_GAIN, _MAX_COST = 100.0, 5.0
 _DISCREPANCY_SPREAD = 0.4  # deviation of the logs of its scale and length, before they are known
 _MAX_RESIDUAL = 100.0  # largest residual in standard deviations from which a discrepancy is estimated
 _MAX_TRIED = 9  # number of searches after which the best optimum is taken though it does not explain the record
+# Ratio of the cost to the least one below which optima are alike, and number of such from which others will be, too.
+_ALIKE, _MANY_ALIKE = 1.25, 3
 _MAX_COST_RATIO = 0.9  # share of the cost that a search from Step 2's contacts may leave to be taken
 
 
@@ -97,15 +99,20 @@ def event_brackets(model: ContourModel) -> Brackets:
 
 def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
     """Return the first optimum of `optima_of` that explains the record, or else the best of the first ones."""
-    best: ContourOptimum | None = None
-    for tried, found in enumerate(optima_of(model, rng, deadline), start=1):
-        if best is None or found.cost < best.cost:
-            best = found
-        if best.fits or tried == _MAX_TRIED:
+    tried: list[ContourOptimum] = []
+    for found in optima_of(model, rng, deadline):
+        tried.append(found)
+        if found.fits or len(tried) == _MAX_TRIED or are_alike(tried):
             break
-    if best is None:
+    if not tried:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
-    return best
+    return min(tried, key=lambda one: one.cost)
+
+
+def are_alike(optima: Sequence[ContourOptimum | Optimum]) -> bool:
+    """Return True if so many of the optima have nearly the least cost that further searches would end there, too."""
+    costs = np.array([one.cost for one in optima])
+    return bool(costs.size and np.count_nonzero(costs < _ALIKE * costs.min()) >= _MANY_ALIKE)
 
 
 def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
@@ -120,13 +127,12 @@ def optimum_beside(
 ) -> ContourOptimum:
     """Return the best of the optima from starts by name, for a contour of its family, and from Step 2's contacts."""
     search = _Search(model, _prior_quantiles(model), deadline)
-    best: Optimum | None = None
+    tried: list[Optimum] = []
     for found in optima(search.residuals, search.beside(starts), *search.limits):
-        best = found if best is None or found.cost < best.cost else best
-        if best.fits:
+        tried.append(found)
+        if found.fits or are_alike(tried):
             break
-    assert best is not None  # a search begins at the start at least
-    return search.complete(search.refine(best))
+    return search.complete(search.refine(min(tried, key=lambda one: one.cost)))
 
 
 def smooth_optimum(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Floats:
@@ -159,6 +165,9 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
     place = search.coordinates.of(search.named(start)[None])[0] / search.spread
     slopes = central_slopes(lambda points: search.residuals(points * search.spread), place, STEP)
     residuals, loose = search.residuals((place * search.spread)[None])[0], set().union(*added)
+    for i in [i for i, name in enumerate(names) if name in loose and name.removesuffix("_seconds").endswith("lag")]:
+        there = place + np.eye(place.size)[i]  # the derivative by a lag vanishes where it does
+        slopes[:, i] = search.residuals((there * search.spread)[None])[0] - residuals
     weight = 1.0 / np.sqrt(1.0 + np.square(residuals / HUBER_THRESHOLD))
     precision = (slopes.T * weight) @ slopes + np.eye(place.size)
     score = -(slopes.T * weight) @ residuals - (place - search.middle / search.spread)

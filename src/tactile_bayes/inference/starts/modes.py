@@ -16,7 +16,7 @@ from tactile_bayes.inference.densities import ANYTHING, Ends, Proposal
 from tactile_bayes.inference.importance import EFFICIENT, approximate
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather, square_root
-from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optima_of
+from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, are_alike, optima_of
 
 _MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
 _MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a record of few loaded samples
@@ -77,14 +77,15 @@ class Modes:
                 repeats += 1
             else:
                 self.found.append(self._around(optimum))
-            if self._are_all(repeats, tried, many_samples):
+            if self._are_all(others, repeats, tried, many_samples):
                 break
         return others
 
-    def _are_all(self, repeats: int, tried: int, many_samples: bool) -> bool:
+    def _are_all(self, others: list[ContourOptimum], repeats: int, tried: int, many_samples: bool) -> bool:
         """Return True if no further search is worth while, after so many, of which so many ended in known modes."""
         normal = bool(self.found) and self.found[-1].proposal.efficiency > EFFICIENT
-        if many_samples and (normal or repeats == _REPEATS):
+        hopeless = not self.found and are_alike(others)
+        if many_samples and (normal or hopeless or repeats == _REPEATS):
             return True
         if normal and repeats == _REPEATS_FEW_SAMPLES:
             return True
