@@ -44,7 +44,7 @@ def inferred(rig, seed=1, **assumed):
     ],
 )
 def test_what_is_wrong_is_named_first_and_describes_the_record(cause, size, seed):
-    found = causes(inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0, cause: size}), seed), rng=seed)
+    found = causes(inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0, cause: size}), seed))
     assert found.cause.values[0] == cause
     assert found.describes.values[0] == 1
     assert found.log_evidence.values[0] > 5.0 + found.log_evidence.values[1]
@@ -56,7 +56,7 @@ def test_cut_off_readings_are_a_cause_of_which_the_range_is_the_cure():
     record = swept(SHAPE, step=0.03)
     largest = 0.6 * float(np.abs(record.force_y).max())
     cut = replace(CELL, force_range=largest).measure(record, rng=1)
-    found = causes(infer_contour(cut, rig=Rig(load_cell=CELL), rng=1, settings=BRIEF), rng=1)
+    found = causes(infer_contour(cut, rig=Rig(load_cell=CELL), rng=1, settings=BRIEF))
     assert found.cause.values[0] == "range"
     assert f"force_range = {largest:.9g}" in str(found.remedy.values[0])
 

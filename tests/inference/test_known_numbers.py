@@ -33,6 +33,7 @@ def record() -> xr.Dataset:
     return made.assign(clock=("sample", times, {"units": "s"}))
 
 
+PLACED = Gauge(PIN)
 FEW = replace(BRIEF, max_steps=2, block_steps=2)
 
 
@@ -49,6 +50,12 @@ def points_of(model, **values):
     return np.array([every[name] for name in model.names]) * np.array([np.ones(len(off)), off])
 
 
+@cache
+def as_stated(**options):
+    model = model_of({}, **options)
+    return model.log_likelihood(points_of(model), pointwise=True)
+
+
 def test_numbers_of_all_parameters_are_tried():
     assert {name for name in KNOWN if not name.startswith("base")} == set(PARAMETERS) - NEVER_KNOWN
 
@@ -56,15 +63,14 @@ def test_numbers_of_all_parameters_are_tried():
 @pytest.mark.parametrize("name", KNOWN)
 def test_a_known_number_is_as_one_that_is_inferred_at_that_value(name):
     """Beside other deviations, of contours at the truth and off it."""
-    gauge = {"gauge": Gauge(PIN)} if name in GROUPS["gauge"] else {}
+    gauge = {"gauge": PLACED} if name in GROUPS["gauge"] else {}
     known, free = model_of({name: KNOWN[name]}, **gauge), model_of({name: "default"}, **gauge)
     assert name not in known.names
     assert name in free.names
     expected = free.log_likelihood(points_of(free, **{name: KNOWN[name]}), pointwise=True)
     found = known.log_likelihood(points_of(known), pointwise=True)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-    as_stated = model_of({}, **gauge)
-    assert np.abs(found - as_stated.log_likelihood(points_of(as_stated), pointwise=True)).max() > 1e-3
+    assert np.abs(found - as_stated(**gauge)).max() > 1e-3
 
 
 @pytest.mark.parametrize("seed", range(4))

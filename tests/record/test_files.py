@@ -87,7 +87,7 @@ def awkward_record():
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @example(record=awkward_record())
 @given(record=records())
 def test_a_file_loses_nothing(tmp_path, suffix, record):
