@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 import tactile_bayes as tb
 
 RADIUS = 10e-3 + 0.12e-3  # of the corner and of the whisker [m]; the flanks are at 45°
+PLACES = 101  # along what was touched
 BAND, DRAWN = {"color": "#0072B2", "alpha": 0.35, "linewidth": 0}, {"color": "black", "linewidth": 1.0}
 
 
@@ -38,10 +39,11 @@ def distances(band: xr.Dataset, shift: np.ndarray) -> np.ndarray:
 
 
 def compared(posterior: xr.DataTree) -> tuple[xr.Dataset, np.ndarray, np.ndarray]:
-    """Return the band of the shape where it was touched, the drawing's shift, and its distances."""
+    """Return the band of the shape where it was touched and no draw ends, the drawing's shift, and its distances."""
     touched = tb.uncertainty.implied_contacts(posterior, draws=10)["posterior"].contact_x.median(("chain", "draw"))
-    x = np.linspace(float(touched.min()), float(touched.max()), 101)
+    x = np.linspace(float(touched.min()), float(touched.max()), PLACES)
     band = tb.uncertainty.normal_band(posterior, x, 0.95, align="translation")
+    band = band.isel(x=band.status.values == "ok")
     lowest = int(np.argmin(band.y.values))
     start = np.array([x[lowest], band.y.values[lowest]])
     shift = least_squares(lambda at: distances(band, at) - band["median"].values, start, x_scale=1e-3, diff_step=1e-3).x
@@ -72,10 +74,9 @@ def main() -> None:
     band, shift, off = compared(tb.read_result(path))
     held = (off >= band.lower.values) & (off <= band.upper.values)
     wide = 5e5 * (band.upper.values - band.lower.values)
-    print(
-        f"slopes of {np.degrees(band.slope_angle.values[[0, -1]]).round()}°: the band of ± {wide.min():.0f} to", end=" "
-    )
-    print(f"{wide.max():.0f} µm holds at {held.mean():.0%}, {1e6 * np.std(off - band['median'].values):.0f} µm rms")
+    slopes, rms = np.degrees(band.slope_angle.values[[0, -1]]).round(), 1e6 * np.std(off - band["median"].values)
+    print(f"{band.x.size} of {PLACES} places, slopes of {slopes}°: the band of ± {wide.min():.0f} to", end=" ")
+    print(f"{wide.max():.0f} µm holds at {held.mean():.0%}, {rms:.0f} µm rms")
     picture(band, shift, off).savefig(path.with_name("square.png"), dpi=110, bbox_inches="tight")
 
 
