@@ -24,6 +24,7 @@ from tactile_bayes.rig.parameters import GROUPS
 
 _PRIOR_DRAWS = 1000
 _PRIOR_QUANTILES = 25
+_STEP_OF_ADDED = 0.2  # of the differences by a parameter that is added, in prior standard deviations
 _FARTHEST = 2.0  # longest step to first order, in prior standard deviations of a parameter
 # Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
 # early, since a sample at an event is loaded or not.
@@ -163,8 +164,10 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
     """
     search, names = _Search(model, _prior_quantiles(model), NEVER), model.forward_parameters
     place = search.coordinates.of(search.named(start)[None])[0] / search.spread
-    slopes = central_slopes(lambda points: search.residuals(points * search.spread), place, STEP)
     residuals, loose = search.residuals((place * search.spread)[None])[0], set().union(*added)
+    # Where a parameter is as stated, another solution of the rod may take over, a little off.
+    steps = np.where([name in loose for name in names], _STEP_OF_ADDED, STEP)
+    slopes = central_slopes(lambda points: search.residuals(points * search.spread), place, steps)
     for i in [i for i, name in enumerate(names) if name in loose and name.removesuffix("_seconds").endswith("lag")]:
         there = place + np.eye(place.size)[i]  # the derivative by a lag vanishes where it does
         slopes[:, i] = search.residuals((there * search.spread)[None])[0] - residuals
