@@ -165,9 +165,15 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
     search, names = _Search(model, _prior_quantiles(model), NEVER), model.forward_parameters
     place = search.coordinates.of(search.named(start)[None])[0] / search.spread
     residuals, loose = search.residuals((place * search.spread)[None])[0], set().union(*added)
-    # Where a parameter is as stated, another solution of the rod may take over, a little off.
-    steps = np.where([name in loose for name in names], _STEP_OF_ADDED, STEP)
-    slopes = central_slopes(lambda points: search.residuals(points * search.spread), place, steps)
+
+    def slopes_over(step: float) -> Floats:
+        steps = np.where([name in loose for name in names], step, STEP)
+        return central_slopes(lambda points: search.residuals(points * search.spread), place, steps)
+
+    slopes = slopes_over(STEP)
+    # Where a parameter is as stated, another solution of the rod may take over, a little off, as if all loads jumped.
+    if not (moving := slopes.any(axis=0)).all():
+        slopes = np.where(moving, slopes, slopes_over(_STEP_OF_ADDED))
     for i in [i for i, name in enumerate(names) if name in loose and name.removesuffix("_seconds").endswith("lag")]:
         there = place + np.eye(place.size)[i]  # the derivative by a lag vanishes where it does
         slopes[:, i] = search.residuals((there * search.spread)[None])[0] - residuals
