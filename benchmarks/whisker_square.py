@@ -45,7 +45,7 @@ def compared(posterior: xr.DataTree) -> tuple[xr.Dataset, np.ndarray, np.ndarray
     band = tb.uncertainty.normal_band(posterior, x, 0.95, align="translation")
     band = band.isel(x=band.status.values == "ok")
     lowest = int(np.argmin(band.y.values))
-    start = np.array([x[lowest], band.y.values[lowest]])
+    start = np.array([band.x.values[lowest], band.y.values[lowest]])
     shift = least_squares(lambda at: distances(band, at) - band["median"].values, start, x_scale=1e-3, diff_step=1e-3).x
     return band, shift, distances(band, shift)
 

@@ -26,7 +26,14 @@ def test_numbers_of_all_parameters_are_tried():
     assert {name for name in KNOWN if not name.startswith("base")} == set(PARAMETERS) - NOT_SWEPT
 
 
-@pytest.mark.parametrize(("name", "length"), [*((name, 0.1) for name in [*KNOWN, "all"]), ("all", None)])
+@pytest.mark.parametrize(
+    ("name", "length"),
+    [
+        *((name, 0.1) for name in [*KNOWN, "all"]),
+        ("all", None),
+        *(pytest.param(name, None, marks=pytest.mark.slow) for name in KNOWN),
+    ],
+)
 def test_a_scan_that_is_read_is_what_inference_expects(name, length):
     rod, cell, contour, bases, known = scaled(length or 1.0, 1.0 if length is None else 2e-4)
     every = {other: known[other] for other in KNOWN if other != "taper_error"}  # which is in the taper

@@ -171,12 +171,12 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
         return central_slopes(lambda points: search.residuals(points * search.spread), place, steps)
 
     slopes = slopes_over(STEP)
-    # Where a parameter is as stated, another solution of the rod may take over, a little off, as if all loads jumped.
-    if not (moving := slopes.any(axis=0)).all():
-        slopes = np.where(moving, slopes, slopes_over(_STEP_OF_ADDED))
     for i in [i for i, name in enumerate(names) if name in loose and name.removesuffix("_seconds").endswith("lag")]:
         there = place + np.eye(place.size)[i]  # the derivative by a lag vanishes where it does
         slopes[:, i] = search.residuals((there * search.spread)[None])[0] - residuals
+    # Where a parameter is as stated, another solution of the rod may take over, a little off, as if all loads jumped.
+    if not (moving := slopes.any(axis=0)).all():
+        slopes = np.where(moving, slopes, slopes_over(_STEP_OF_ADDED))
     weight = 1.0 / np.sqrt(1.0 + np.square(residuals / HUBER_THRESHOLD))
     precision = (slopes.T * weight) @ slopes + np.eye(place.size)
     score = -(slopes.T * weight) @ residuals - (place - search.middle / search.spread)
