@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverage
+from tactile_bayes.calibration.summary import coverage_p_value, noticed_coverage
 
 LEVEL, POWER = 1e-3, 0.9
 

@@ -9,11 +9,16 @@ from scipy import stats
 from scipy.special import ndtri
 
 from tactile_bayes.calibration.calibrate import experiment_of
-from tactile_bayes.calibration.coverage import noticed_coverage
 from tactile_bayes.calibration.ranks import noticed_ranks
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
-from tactile_bayes.calibration.summary import CLAIMS, FALSE_ALARM, summary
-from tactile_bayes.calibration.verdict import lost_message, power_message
+from tactile_bayes.calibration.summary import (
+    CLAIMS,
+    FALSE_ALARM,
+    lost_message,
+    noticed_coverage,
+    power_message,
+    summary,
+)
 from tactile_bayes.rig import Rig
 
 EXPERIMENT = experiment_of(rig=Rig(unknown="nothing"), rng=1)

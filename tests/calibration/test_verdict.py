@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.calibration.ranks import NoticedRanks
-from tactile_bayes.calibration.verdict import Tally, conclusion, lost_message, power_message, statement
+from tactile_bayes.calibration.summary import Tally, conclusion, lost_message, power_message, statement
 
 NOTHING = NoticedRanks(np.nan, np.nan, np.nan)
 

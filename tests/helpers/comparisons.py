@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.comparison.verdict import verdict_on
+from tactile_bayes.comparison.families import verdict_on
 
 NAMES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 

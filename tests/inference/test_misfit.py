@@ -5,7 +5,7 @@ import re
 import pytest
 
 from helpers.comparisons import made_up
-from tactile_bayes.comparison.verdict import NONE_FITS, verdict_on
+from tactile_bayes.comparison.families import NONE_FITS, verdict_on
 from tactile_bayes.inference.misfit import what_to_try
 
 OF_ROD = ["rest_curvature", "taper", "stem", "length"]

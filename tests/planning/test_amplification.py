@@ -9,8 +9,7 @@ import pytest
 import tactile_bayes as tb
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.planning.amplification import METHODS, SOURCES, amplification, contact_errors
-from tactile_bayes.planning.family_parameters import enlarged
-from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.plan import Plan, enlarged
 from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)

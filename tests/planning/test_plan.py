@@ -14,9 +14,8 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
-from tactile_bayes.planning.error_covariance import whitening
-from tactile_bayes.planning.family_parameters import enlarged, family_parameters
-from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.plan import Plan, enlarged, family_parameters
+from tactile_bayes.planning.record_information import whitening
 from tactile_bayes.record import loads_of
 from tactile_bayes.rig import NOTHING, Rig
 

@@ -8,7 +8,7 @@ from helpers.comparisons import made_up
 from helpers.pictures import labels, own_axes, row_labels, texts
 from helpers.refusals import refused
 from tactile_bayes import plotting
-from tactile_bayes.comparison.verdict import NONE_FITS
+from tactile_bayes.comparison.families import NONE_FITS
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour

@@ -6,8 +6,7 @@ import xarray as xr
 
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.uncertainty.averaged_contours import averaged_heights
-from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.band import averaged_heights, contour_band
 
 
 def comparison(probability, weight=None, none_fits=0):

@@ -6,7 +6,7 @@ import pytest
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.base import Locus
 from tactile_bayes.contours.shape_free import ShapeFree
-from tactile_bayes.uncertainty.certificate import triangle
+from tactile_bayes.uncertainty.gap import triangle
 
 
 def at(contour, *x):

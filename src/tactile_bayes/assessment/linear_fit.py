@@ -11,8 +11,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.numerics.blocks import blocks
-from tactile_bayes.planning.error_covariance import NoiseWhitening, whitening
-from tactile_bayes.planning.record_information import prior_precision, scaled_cell
+from tactile_bayes.planning.record_information import NoiseWhitening, prior_precision, scaled_cell, whitening
 
 _DIFFERENCE = 0.1  # step of differences, in posterior standard deviations
 _MOST_CORRELATED = 6000  # largest number of readings whose covariance is factorised, in 0.3 GB

@@ -15,7 +15,6 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.assessment.split_prediction import predicted_readings
-from tactile_bayes.calibration.coverage import coverage_p_value
 from tactile_bayes.calibration.replicate import (
     REPLICATES,
     Outcome,
@@ -26,7 +25,7 @@ from tactile_bayes.calibration.replicate import (
     walkers_of,
 )
 from tactile_bayes.calibration.simulation import Simulation
-from tactile_bayes.calibration.summary import summary
+from tactile_bayes.calibration.summary import coverage_p_value, summary
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_model import ContourModel

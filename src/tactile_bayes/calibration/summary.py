@@ -3,15 +3,126 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
+from scipy import stats
+from scipy.special import betaincinv, rel_entr
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverage
 from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniformity_p_value
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
-from tactile_bayes.calibration.verdict import FEWEST, POWER, Tally, conclusion, lost_message, power_message, statement
+
+_MARGIN = 0.01  # error in probability that is allowed for quantiles of some hundred draws
+
+
+def coverage_p_value(share: ArrayLike, count: int, probability: float, *, is_whole: bool) -> Floats:
+    """Return an upper bound on the probability that an observed coverage is as far from the stated one by chance."""
+    share = np.asarray(share, dtype=float)
+    limit = np.clip(share, probability - _MARGIN, min(probability + _MARGIN, 1.0))
+    is_tested = (share != limit) & (limit > 0.0) & (limit < 1.0)
+    if is_whole:
+        held = np.rint(share * count)
+        one_sided = np.where(share > limit, stats.binom.sf(held - 1, count, limit), stats.binom.cdf(held, count, limit))
+    else:
+        one_sided = np.exp(-count * (rel_entr(share, limit) + rel_entr(1.0 - share, 1.0 - limit)))
+    return np.where(is_tested, np.minimum(1.0, 2.0 * one_sided), 1.0)
+
+
+def noticed_coverage(
+    count: int, probability: float, level: float, power: float, *, is_whole: bool
+) -> tuple[float, float]:
+    """Return the coverages nearest to a stated one, below and above, that a test detects with the probability `power`.
+
+    A claim that holds at a share of the grid points is taken to hold at all or none of them, the largest variance.
+    """
+    held = np.arange(count + 1)
+    is_fault = coverage_p_value(held / count, count, probability, is_whole=is_whole) <= level
+    low, high = held[is_fault & (held < probability * count)], held[is_fault & (held > probability * count)]
+    # With c, P(held ≤ k) = 1 − I_c(k + 1, n − k) and P(held ≥ k) = I_c(k, n − k + 1).
+    below = float(betaincinv(low[-1] + 1, count - low[-1], 1.0 - power)) if low.size else np.nan
+    above = float(betaincinv(high[0], count - high[0] + 1, power)) if high.size else np.nan
+    return below, above
+
+
+Conclusion = Literal["calibrated", "not calibrated", "undecided", "too few"]
+
+FEWEST = 20  # least number of replicates for which uniformity and coverage are tested
+POWER = 0.9  # probability with which the faults that a verdict names would have been detected
+_MOST_LOST = 0.01  # largest share of lost replicates of a calibrated posterior; coverage may be wrong by as much
+# Largest share of unconverged runs; beyond it, the limit of steps is tested instead of the posteriors.
+_MOST_UNCONVERGED = 0.05
+_NAMED = 5  # largest number of lost replicates whose numbers are stated
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Numbers of replicates: all, lost, and not converged."""
+
+    replicates: int
+    lost: int = 0
+    unconverged: int = 0
+
+    @property
+    def has_few_lost(self) -> bool:
+        """True if the share of lost replicates permits a conclusion."""
+        return self.lost <= _MOST_LOST * self.replicates
+
+    @property
+    def has_few_unconverged(self) -> bool:
+        """True if the share of unconverged runs permits a conclusion."""
+        return self.unconverged <= _MOST_UNCONVERGED * self.replicates
+
+
+def conclusion(tally: Tally, *, has_faults: bool) -> Conclusion:
+    """Return the conclusion: a fault stands whatever was lost; its absence counts if nearly all were tested."""
+    if tally.replicates < FEWEST:
+        return "too few"
+    if has_faults:
+        return "not calibrated"
+    return "calibrated" if tally.has_few_lost and tally.has_few_unconverged else "undecided"
+
+
+def statement(concluded: Conclusion, tally: Tally, reason: str) -> str:
+    """Return the sentence of a conclusion, with the reason why posteriors are called calibrated or not."""
+    count, left = tally.replicates, tally.replicates - tally.lost
+    if concluded == "calibrated":
+        return f"Calibrated, as far as {count} replicates show: {reason}."
+    if concluded == "not calibrated":
+        return f"Not calibrated, over {count} replicates: {reason}."
+    if concluded == "too few":
+        return f"Too few replicates to judge: {left} posteriors, and at least {FEWEST} are needed."
+    too_many = [] if tally.has_few_lost else [f"{tally.lost} were lost (at most {_MOST_LOST:.0%} may be)"]
+    if not tally.has_few_unconverged:
+        too_many.append(f"{tally.unconverged} did not converge (at most {_MOST_UNCONVERGED:.0%} may)")
+    rest = "no other fault is found" if left >= FEWEST else f"{left} posteriors are left, {FEWEST} are needed"
+    return f"Undecided: of {count} replicates {' and '.join(too_many)}; {rest}."
+
+
+def power_message(probability: float, below: float, above: float, ranks: NoticedRanks) -> str:
+    """Return the sentence on the faults that would have been detected; NaN stands for none of a kind."""
+    bounds = {"at most": below, "at least": above}
+    coverages = [f"{bound} {share:.1%}" for bound, share in bounds.items() if np.isfinite(share)]
+    faults = [f"coverage of {' or '.join(coverages)} in place of {probability:.0%}"] if coverages else []
+    faults += [f"posteriors off by {ranks.shift:.2g} standard deviations"] if np.isfinite(ranks.shift) else []
+    widths = {"narrow": ranks.narrow, "wide": ranks.wide}
+    faults += [f"too {way} by a factor of {factor:.2f}" for way, factor in widths.items() if np.isfinite(factor)]
+    return f"Faults that would have been detected with a probability of {POWER:.0%}: {', '.join(faults)}."
+
+
+def lost_message(messages: Mapping[int, str]) -> str:
+    """Return the sentence on lost replicates, and how to see the reason, from their messages by number."""
+    numbers = list(messages)
+    first = ", ".join(map(str, numbers[:_NAMED])) + (", …" if len(numbers) > _NAMED else "")
+    kinds = ", ".join(dict.fromkeys(message.partition(":")[0] for message in messages.values()))
+    return (
+        f"{len(numbers)} lost, in which no claim holds: {first} ({kinds}). To see why, add --replicate {numbers[0]} "
+        f"--debug to the command, or call calibration_replicate({numbers[0]}, …) with the options of calibrate."
+    )
+
 
 FALSE_ALARM = 0.01  # largest probability that the verdict finds a fault in right posteriors
 # Statements that must hold with the stated probability: names and descriptions.

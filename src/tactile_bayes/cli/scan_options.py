@@ -127,7 +127,7 @@ class ContourOptions:
         import numpy as np
 
         from tactile_bayes.contours import from_points, paper_profile
-        from tactile_bayes.planning.family_parameters import enlarged
+        from tactile_bayes.planning.plan import enlarged
         from tactile_bayes.record.points import read_points
 
         of_profile = self.profile is not None or self.distance is not None

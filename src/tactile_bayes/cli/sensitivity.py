@@ -69,7 +69,7 @@ def sensitivity(
     """
     from tactile_bayes.contours import paper_profile
     from tactile_bayes.mechanics.rods.rod import Rod
-    from tactile_bayes.planning.family_parameters import enlarged
+    from tactile_bayes.planning.plan import enlarged
     from tactile_bayes.runs.sensitivity import sensitivity_into, steps_of
     from tactile_bayes.sweep import Rotation
 

@@ -15,7 +15,6 @@ from threadpoolctl import threadpool_limits
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_probability, check_switch, refused
 from tactile_bayes.comparison.leave_one_out import LeftOut, predicted_samples, stacking_weights
-from tactile_bayes.comparison.verdict import verdict_on
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.diagnostics.predictive_check import predictive_check
@@ -26,6 +25,7 @@ from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.parameters.priors import matched_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
 from tactile_bayes.inference.starts.contour_start import walk_of
@@ -33,6 +33,7 @@ from tactile_bayes.numerics.random_numbers import Rng, spawn
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
 from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.rod_reach import reach_attributes
 
 # Families that are compared by default; the last but one has flanks of two shapes.
@@ -302,3 +303,47 @@ def _left_out(predicted: Sequence[LeftOut | None]) -> dict[str, Any]:
     }
     found: dict[str, Any] = {name: ("family", values) for name, values in of_families.items()}
     return found | {"log_density": (("family", "sample"), logs)}
+
+
+# Beginning of the verdict if no family passes the check.
+NONE_FITS = "None fits: with the rig as assumed, the record does not look like one of any of these shapes"
+_LIKELY = 0.05  # smallest probability with which a family is named
+
+
+def verdict_on(result: xr.Dataset) -> str:
+    """Return the verdict on a comparison of families, from the result of `compare_families`."""
+    names = [str(name) for name in result.family.values]
+    fits, checked = result.fits.values, np.isfinite(result.p_value.values)
+    if checked.any() and not fits.any():
+        return f"{NONE_FITS} ({', '.join(names)}). Probabilities say which of them is the least wrong. " + what_to_try(
+            names, read_json(result.attrs["nuisances"], "nuisances"), friction=result.attrs["friction"]
+        )
+    parts = []
+    probability = result.probability.values
+    if np.isnan(probability).any():
+        lacking = [name for name, value in zip(names, result.log_evidence.values, strict=True) if np.isnan(value)]
+        parts.append(f"No probabilities: the evidence of {', '.join(lacking)} cannot be computed from its draws")
+    else:
+        order = np.argsort(probability)[::-1]
+        likely = [i for i in order if probability[i] >= _LIKELY]
+        parts.append(", ".join(f"{names[i]} with probability {_share(probability[i])}" for i in likely))
+        if checked[order[0]] and not fits[order[0]]:
+            parts.append(f"but a record of a {names[order[0]]} would not look like this one")
+        elif names[order[0]] == "shape-free":
+            parts.append("that is, a smooth contour of none of the other shapes")
+        firm = result.probability_by_width.values[:, order[0]]
+        if firm.min() < 0.5 <= firm.max():
+            parts.append(
+                f"which depends on the width of the priors: from {_share(firm.min())} to {_share(firm.max())} with "
+                "half and twice the width"
+            )
+    if not checked.any():
+        parts.append("whether the record looks like one of them was not checked: too few samples are loaded")
+    poor = [name for name, good in zip(names, (result.converged | ~result.sampled).values, strict=True) if not good]
+    if poor:
+        parts.append(f"not converged: {', '.join(poor)}")
+    return "; ".join(parts)
+
+
+def _share(probability: float) -> str:
+    return "above 0.999" if probability > 0.999 else f"{probability:.2g}"

@@ -26,7 +26,7 @@ from tactile_bayes.record import rod_of, validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
-from tactile_bayes.uncertainty.averaged_contours import averaged_heights
+from tactile_bayes.uncertainty.band import averaged_heights
 
 _KIND = "streams of families of tactile-bayes"
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Flags
 from tactile_bayes.inference.misfit import CHECK_RIG
+from tactile_bayes.record.rig_entry import rig_entry
 
 _UNITS = "check the units of the loads, and the rod's length and flexural rigidity."
 
@@ -187,3 +188,28 @@ def of_sweeps(numbers: Sequence[int], verb: str, past: str = "") -> str:
     """Return text like "Sweeps 1 and 3 show", with the verb, or with its past form."""
     one = len(numbers) == 1
     return f"Sweep{'' if one else 's'} {joined(list(map(str, numbers)))} {past or verb + 's' * one}"
+
+
+NOISE_FACTOR = 2.0  # ratio of found to stated noise beyond which it is reported: data sheets are no more accurate
+OFF_ZERO = 5.0  # standard errors by which a zero must differ from the stated one to be reported
+
+
+def moved_zero(p_values: Mapping[str, float], false_alarm: float, known: Container[str] = ()) -> list[Finding]:
+    """Report channels whose zero moved between unloaded stretches, except those of which that is known."""
+    level = false_alarm / max(sum(map(math.isfinite, p_values.values())), 1)
+    moved = [
+        f"{name} (p = {p_value:.1g} if it had not)"
+        for name, p_value in p_values.items()
+        if p_value < level and name not in known
+    ]
+    return [Finding("zero moved", moved=", ".join(moved), entry=rig_entry("drift", "default", "unknown"))] * bool(moved)
+
+
+def zero_off(zeros: Mapping[str, tuple[float, float, str]], advice: str) -> list[Finding]:
+    """Report channels whose zero is off what is expected: by how much, its standard error, and its unit."""
+    off = [
+        f"{name} is off by {quantity(away, unit)} ({abs(away) / error:.0f} standard errors)"
+        for name, (away, error, unit) in zeros.items()
+        if abs(away) > OFF_ZERO * error > 0.0
+    ]
+    return [Finding("zero off", off=", ".join(off), advice=advice)] * bool(off)

@@ -13,12 +13,20 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_optional, check_probability, refused
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.findings import Finding, contradiction, of_sweeps, quantity
+from tactile_bayes.diagnostics.findings import (
+    NOISE_FACTOR,
+    OFF_ZERO,
+    Finding,
+    contradiction,
+    moved_zero,
+    of_sweeps,
+    quantity,
+    zero_off,
+)
 from tactile_bayes.diagnostics.likely_causes import likely_causes
 from tactile_bayes.diagnostics.predictive_check import Residuals, predictive_check, residuals_of
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
-from tactile_bayes.diagnostics.zeros import NOISE_FACTOR, OFF_ZERO, moved_zero, zero_off
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.misfit import GAUGE, is_inferred, what_to_try
 from tactile_bayes.inference.result import is_streamed, known_of, posterior_draws, record_of, refuse_no_contour

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_optional, check_positive
-from tactile_bayes.contours import Contour
+from tactile_bayes.contours import Contour, Joined
 from tactile_bayes.contours.base import check_single
+from tactile_bayes.contours.families import FLANKS, family_named, sides_of
 from tactile_bayes.errors import ClearanceWarning, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
@@ -23,7 +24,6 @@ from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN, MEMORY
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.planning.record_information import ReadingSlopes, reading_slopes
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, validate, with_rod
@@ -31,6 +31,37 @@ from tactile_bayes.rig.corrected import corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.sweep import Drive, Rotation, Scan, drives_of, scan
+
+
+def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
+    """Return the name of a contour's family, as in `infer_contour`, and its parameters."""
+    if not isinstance(contour, Contour):
+        raise ParameterError(f"{contour!r} is no contour: give one of tb.contours, like paper_profile('II', q=0.5)")
+    if contour.shape != ():
+        raise ParameterError(f"{contour!r} is a list of contours: give a single one")
+    halves: list[Any] = [contour.left, contour.right] if isinstance(contour, Joined) else [contour]
+    names = [name for half in halves for name, flank in FLANKS.items() if isinstance(half, flank.contour)]
+    if len(names) < len(halves) or len(vertices := {(float(half.q), float(half.x_c)) for half in halves}) > 1:
+        raise ParameterError(
+            f"{type(contour).__name__} is of no family with parameters: give a parabola, circle, ellipse or power law, "
+            "or two of these joined at their vertex"
+        )
+    ((q, x_c),) = vertices
+    family = "/".join(names)
+    own = {
+        f"{side}{parameter}": float(getattr(half, parameter))
+        for half, (side, flank) in zip(halves, sides_of(family).items(), strict=True)
+        for parameter in FLANKS[flank].table
+    }
+    return family, {**own, "q": q, "x_c": x_c}
+
+
+def enlarged(contour: Contour, factor: float) -> Contour:
+    """Return a contour scaled by a factor about the origin."""
+    name, values = family_parameters(contour)
+    family = family_named(name)
+    return family.build(*(values[p] * factor ** family.length_powers[p] for p in family.parameters))
+
 
 SAMPLE_COLUMNS = ["sweep", "direction", "base_x", "base_y", "drive_angle"]  # columns of a record that results repeat
 

@@ -148,7 +148,7 @@ def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:
     """Write the verdict above the panels, from the left edge of the first one."""
     words, style, letters = str(comparison.attrs["verdict"]), {"fontsize": "medium"}, 10.5
     if not comparison["fits"].any():
-        from tactile_bayes.comparison.verdict import NONE_FITS  # loads the sampler
+        from tactile_bayes.comparison.families import NONE_FITS  # loads the sampler
 
         words, letters = NONE_FITS, 6.5
         style = {"fontsize": "x-large", "fontweight": "bold", "color": _WARNING}

@@ -9,15 +9,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_numbers, refused
 from tactile_bayes.contours.base import Contour, check_single
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import COLUMNS
-from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family_weights
 from tactile_bayes.uncertainty.offsets import Moves, aligned, feet_of, heights_of, most_central, normal_offsets
 from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach, reach
@@ -221,3 +221,40 @@ def grid_points(x: ArrayLike) -> Floats:
 def length_unit(posterior: xr.DataTree | xr.Dataset) -> dict[str, Any]:
     """Attributes of lengths in the record's unit."""
     return {"units": COLUMNS["base_x"].unit_in(posterior.attrs["units"])}
+
+
+def family_weights(comparison: xr.Dataset) -> tuple[Floats, str]:
+    """Return the weight of each family, shape (families,), of sum one, and their source, "evidence" or "stacking"."""
+    if "contour_draws" not in comparison:
+        raise InferenceError("this comparison has no draws of contours: compare again")
+    if comparison.attrs.get("none_fits"):
+        raise InferenceError("none of the families fits the record: their average does not describe it either")
+    for name, source in (("probability", "evidence"), ("weight", "stacking")):
+        if name in comparison and np.isfinite(comparison[name].values).all():
+            weights = np.asarray(comparison[name].values, dtype=float)
+            return weights / weights.sum(), source
+    raise InferenceError(
+        "there is no evidence of some family, and no stacking weights: compare longer, or with leave_one_out=True"
+    )
+
+
+def averaged_heights(comparison: xr.Dataset, x: Floats, most: int) -> Floats:
+    """Return heights at x of `most` contours, of which each family has its share; shape (contours, x)."""
+    weights, _ = family_weights(comparison)
+    heights = []
+    for name, count in zip(comparison["family"].values, _counts(weights, most), strict=True):
+        if not count:
+            continue
+        family = family_named(str(name))
+        draws = comparison["contour_draws"].sel(family=name).values[:, : len(family.parameters)]
+        picked = np.floor((np.arange(count) + 0.5) * len(draws) / count).astype(np.intp)
+        heights.append(heights_of(family.build(*draws[picked].T), x))
+    return np.concatenate(heights)
+
+
+def _counts(weights: Floats, most: int) -> Index:
+    """Return whole numbers of sum `most` in proportion to weights, by largest remainders."""
+    exact = weights * most
+    counts = np.floor(exact).astype(np.intp)
+    counts[np.argsort(counts - exact, kind="stable")[: most - counts.sum()]] += 1
+    return counts

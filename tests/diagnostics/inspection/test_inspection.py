@@ -11,8 +11,7 @@ from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.inspection import known_cell
-from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, stuck, uneven_steps
-from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
+from tactile_bayes.diagnostics.inspection.samples import autocorrelation, outliers, repeat_chance, stuck, uneven_steps
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell

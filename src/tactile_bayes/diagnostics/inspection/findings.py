@@ -9,10 +9,19 @@ import xarray as xr
 from scipy.special import ndtri
 
 from tactile_bayes.arrays import Flags
-from tactile_bayes.diagnostics.findings import Finding, counted, joined, listed, of_sweeps, quantity
-from tactile_bayes.diagnostics.inspection.corrections import OTHER_ANGLE
-from tactile_bayes.diagnostics.inspection.fit import Fit
-from tactile_bayes.diagnostics.zeros import NOISE_FACTOR, OFF_ZERO, moved_zero, zero_off
+from tactile_bayes.diagnostics.findings import (
+    NOISE_FACTOR,
+    OFF_ZERO,
+    Finding,
+    counted,
+    joined,
+    listed,
+    moved_zero,
+    of_sweeps,
+    quantity,
+    zero_off,
+)
+from tactile_bayes.diagnostics.inspection.fit import OTHER_ANGLE, Fit
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
