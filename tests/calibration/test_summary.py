@@ -1,5 +1,6 @@
 """What replicates say together, of replicates made up: right ones, wrong ones, few and failed ones."""
 
+import math
 import re
 
 import numpy as np
@@ -9,14 +10,18 @@ from scipy import stats
 from scipy.special import ndtri
 
 from tactile_bayes.calibration.calibrate import experiment_of
-from tactile_bayes.calibration.ranks import noticed_ranks
+from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 from tactile_bayes.calibration.summary import (
     CLAIMS,
     FALSE_ALARM,
+    Tally,
+    conclusion,
+    coverage_p_value,
     lost_message,
     noticed_coverage,
     power_message,
+    statement,
     summary,
 )
 from tactile_bayes.rig import Rig
@@ -267,3 +272,123 @@ def test_a_summary_can_be_kept(tmp_path):
         assert again.attrs["verdict"] == found.attrs["verdict"]
         np.testing.assert_array_equal(again["ranks"], found["ranks"])
         np.testing.assert_array_equal(again.traceback, found.traceback)
+
+
+LEVEL, POWER = 1e-3, 0.9
+
+
+def binomial(count, probability):
+    """Probabilities of 0, 1, …, count, from factorials."""
+    return np.array(
+        [math.comb(count, k) * probability**k * (1.0 - probability) ** (count - k) for k in range(count + 1)]
+    )
+
+
+def p_values(count, probability, is_whole):
+    return coverage_p_value(np.arange(count + 1) / count, count, probability, is_whole=is_whole)
+
+
+def power(count, probability, coverage, is_whole):
+    """Probability that the test finds a fault, where a claim holds as a whole with another probability."""
+    return float(binomial(count, coverage) @ (p_values(count, probability, is_whole) <= LEVEL))
+
+
+def test_p_values_of_whole_claims_are_twice_a_binomial_tail():
+    """Of the coverage next to the share that a hundredth more or less allows."""
+    found = p_values(50, 0.9, True)
+    low, high = binomial(50, 0.89), binomial(50, 0.91)
+    np.testing.assert_allclose(found[[30, 44]], [2.0 * low[:31].sum(), min(1.0, 2.0 * low[:45].sum())], rtol=1e-12)
+    np.testing.assert_allclose(found[50], 2.0 * high[50], rtol=1e-12)
+    assert coverage_p_value(0.9, 50, 0.9, is_whole=True) == 1.0
+    assert coverage_p_value(0.905, 50, 0.9, is_whole=True) == 1.0
+
+
+def test_p_values_of_shares_are_the_bound():
+    """Hoeffding's, written as a power."""
+    found = float(coverage_p_value(0.7, 40, 0.9, is_whole=False))
+    np.testing.assert_allclose(found, 2.0 * ((0.89 / 0.7) ** 0.7 * (0.11 / 0.3) ** 0.3) ** 40, rtol=1e-12)
+    assert np.all(p_values(40, 0.9, False) >= p_values(40, 0.9, True) * (1.0 - 1e-12))
+    # Of what is stated with 99.5 % a hundredth more is everything.
+    assert coverage_p_value(1.0, 1000, 0.995, is_whole=True) == 1.0
+    assert coverage_p_value(0.0, 1000, 0.005, is_whole=True) == 1.0
+
+
+@pytest.mark.parametrize("is_whole", [True, False])
+@pytest.mark.parametrize(("count", "probability"), [(20, 0.5), (100, 0.9), (200, 0.9)])
+def test_coverages_next_to_a_right_one_are_noticed_as_often_as_stated(count, probability, is_whole):
+    """By a sum over all outcomes; those of the other side count as well, with less than the level."""
+    for coverage in noticed_coverage(count, probability, LEVEL, POWER, is_whole=is_whole):
+        assert abs(power(count, probability, coverage, is_whole) - POWER) < LEVEL
+        nearer = coverage + 0.01 * np.sign(probability - coverage)
+        assert power(count, probability, nearer, is_whole) < POWER
+
+
+def test_what_no_number_of_successes_shows_is_noticed_by_none():
+    """All of 20 hold once in seven times where nine of ten are to."""
+    below, above = noticed_coverage(20, 0.9, LEVEL, POWER, is_whole=True)
+    assert 0.3 < below < 0.6
+    assert np.isnan(above)
+    assert np.isnan(noticed_coverage(3, 0.5, LEVEL, POWER, is_whole=True)).all()
+
+
+NOTHING = NoticedRanks(np.nan, np.nan, np.nan)
+
+
+@pytest.mark.parametrize(
+    ("tally", "has_faults", "expected"),
+    [
+        (Tally(200), False, "calibrated"),
+        (Tally(200, lost=2, unconverged=10), False, "calibrated"),
+        (Tally(20), False, "calibrated"),
+        (Tally(200), True, "not calibrated"),
+        (Tally(200, lost=150, unconverged=50), True, "not calibrated"),
+        (Tally(200, lost=3), False, "undecided"),
+        (Tally(200, unconverged=11), False, "undecided"),
+        (Tally(200, lost=3, unconverged=11), False, "undecided"),
+        (Tally(20, lost=1), False, "undecided"),
+        (Tally(200, lost=200), False, "undecided"),
+        (Tally(19), False, "too few"),
+        (Tally(19, lost=19), True, "too few"),
+    ],
+)
+def test_conclusions(tally, has_faults, expected):
+    assert conclusion(tally, has_faults=has_faults) == expected
+
+
+@pytest.mark.parametrize(
+    ("concluded", "tally", "numbers", "named"),
+    [
+        ("calibrated", Tally(200, lost=1), "200", [": because."]),
+        ("not calibrated", Tally(200, lost=9), "200", [": because."]),
+        ("undecided", Tally(200, lost=3), "200 3 1%", ["3 were lost", "no other fault"]),
+        ("undecided", Tally(200, unconverged=11), "200 11 5%", ["11 did not converge", "no other fault"]),
+        ("undecided", Tally(200, 185, 11), "200 185 1% 11 5% 15 20", ["185 were lost", "15 posteriors"]),
+        ("too few", Tally(19, lost=4), "15 20", ["15 posteriors"]),
+    ],
+)
+def test_statements(concluded, tally, numbers, named):
+    said = statement(concluded, tally, "because")
+    assert said.lower().startswith(concluded)
+    assert re.findall(r"\d+%?", said) == numbers.split()
+    assert all(each in said for each in named)
+    assert said.lower().count("calibrated") == ("calibrated" in concluded)  # one conclusion, and no other
+
+
+def test_lost_ones_in_words():
+    one = lost_message({3: "ValueError: a: b"})
+    assert all(part in one for part in ("1 lost", ": 3 (ValueError).", "calibration_replicate(3, …)"))
+    many = lost_message({n: "ReachError: x" if n % 2 else "KeyError: 'x'" for n in range(4, 10)})
+    for part in ("6 lost", ": 4, 5, 6, 7, 8, … (KeyError, ReachError).", "--replicate 4 --debug"):
+        assert part in many
+
+
+def test_power_message():
+    value, said = r"\d[\d.]*\d%?", power_message(0.9, 0.7694, 0.9844, NoticedRanks(0.391, 1.433, 1.521))
+    assert re.findall(value, said) == ["90%", "76.9%", "98.4%", "90%", "0.39", "1.43", "1.52"]
+    assert "at most 76.9% or at least 98.4%" in said
+    assert re.search(r"0\.39 standard deviations, .*narrow .* 1\.43, .*wide .* 1\.52\.$", said)
+    without = power_message(0.9, 0.43, np.nan, NOTHING)
+    assert re.findall(value, without) == ["90%", "43.0%", "90%"]
+    assert "at most 43.0%" in without
+    shift = power_message(0.9, np.nan, np.nan, NOTHING._replace(shift=1.2))
+    assert re.findall(value, shift) == ["90%", "1.2"]

@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from helpers.contour_posteriors import QUICK
+from helpers.contour_posteriors import QUICK, posterior
 from helpers.predicted_records import ideal, predicted, taken_for_a_parabola, with_readings
 from helpers.refusals import refused
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.contours import Parabola
+from tactile_bayes.diagnostics import reach_edge
+from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.misfit import what_to_try
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import to_arviz
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
@@ -212,3 +215,32 @@ def test_a_sweep_that_goes_back_in_contact_is_named_if_its_way_forth_is_missing(
     measured = measured if has_way_forth else measured.isel(sample=np.flatnonzero(back | ~turned))
     posterior = infer_contour(measured, rig=rig, rng=1, settings=QUICK)
     assert (kinds(check(posterior))[-1] == "no way forth") is not has_way_forth
+
+
+def test_a_right_posterior_is_not_cut_off():
+    assert cut_off_parameters(posterior()) == {}
+
+
+@pytest.fixture
+def walled(monkeypatch):
+    """The model has no path along a contour whose lowest point is above the mean of the draws, less one deviation."""
+    heights = posterior()["posterior"]["q"].values
+    wall = float(np.quantile(heights, 0.9))
+    usable = RecordLikelihood.usable
+
+    def below(self, contours, rig=None):
+        return usable(self, contours, rig) & (np.asarray(contours.q) <= wall)
+
+    monkeypatch.setattr(RecordLikelihood, "usable", below)
+
+
+def test_a_wall_among_the_draws_is_found_and_said_first(walled):
+    assert cut_off_parameters(posterior())["q"] == "above"
+    first = check(posterior()).messages[0]
+    assert first.kind == "cut-off posterior"
+    assert "q (above " in first.details["ends"]
+
+
+def test_ends_of_a_prior_are_no_wall(walled, monkeypatch):
+    monkeypatch.setattr(reach_edge.ContourModel, "log_prior", lambda self, points: np.full(len(points), -np.inf))
+    assert cut_off_parameters(posterior()) == {}

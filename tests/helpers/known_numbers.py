@@ -7,57 +7,26 @@ import numpy as np
 from tactile_bayes.contours import Circle
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig.parameters import PARAMETERS
+from tactile_bayes.rig.parameters import GROUPS, MEMORY, PARAMETERS
 
-# In units of the rod.
-KNOWN = {
-    "rigidity_scale": 1.04,
-    "drive_angle_offset": 0.015,
-    "moment_bias": 0.05,
-    "force_x_bias": -0.04,
-    "force_y_bias": 0.03,
-    "lever_x": 0.005,
-    "lever_y": -0.007,
-    "backlash": 0.02,
-    "friction": 0.15,
-    "moment_drift": 0.1,
-    "force_x_drift": 0.07,
-    "force_y_drift": -0.08,
-    "moment_gain": 1.03,
-    "force_x_gain": 0.96,
-    "force_y_gain": 1.05,
-    "moment_curve_quadratic": -0.01,
-    "moment_curve_cubic": 0.004,
-    "lag": 1.3,
-    "moment_lag": 0.4,
-    "force_x_lag": 0.9,
-    "force_y_lag": 2.1,
-    "lag_seconds": 0.2,
-    "moment_lag_seconds": 0.3,
-    "force_x_lag_seconds": 0.1,
-    "force_y_lag_seconds": 0.05,
-    "play": 0.02,
-    "moment_play": 0.03,
-    "force_x_play": 0.01,
-    "force_y_play": 0.05,
-    "suspension_compliance": 0.03,
-    "contact_compliance": 0.02,
-    "rest_curvature": 0.11,
-    "rest_shape_1": 0.7,
-    "rest_shape_2": -0.4,
-    "rest_shape_3": 1.2,
-    "rest_shape_4": 0.5,
-    "rest_shape_5": -0.8,
-    "taper": 0.25,
-    "taper_error": 0.9,
-    "stem": 0.055,
-    "length": 1.02,
-    "gauge_x": 0.006,
-    "gauge_y": -0.008,
-    "noise_scale": 1.7,
-    "base_2_x": 0.009,
-    "base_2_y": -0.004,
+_NUMBERS = {
+    ("rigidity_scale", "drive_angle_offset", "backlash", "friction", "noise_scale"): (1.04, 0.015, 0.02, 0.15, 1.7),
+    ("lag", "lag_seconds", "play", "suspension_compliance", "contact_compliance"): (1.3, 0.2, 0.02, 0.03, 0.02),
+    ("rest_curvature", "taper", "taper_error", "stem", "length"): (0.11, 0.25, 0.9, 0.055, 1.02),
+    ("base_2_x", "base_2_y"): (0.009, -0.004),
+    GROUPS["bias"]: (0.05, -0.04, 0.03),
+    GROUPS["lever"]: (0.005, -0.007),
+    GROUPS["drift"]: (0.1, 0.07, -0.08),
+    GROUPS["gain"]: (1.03, 0.96, 1.05),
+    GROUPS["moment_curve"]: (-0.01, 0.004),
+    GROUPS["rest_shape"]: (0.7, -0.4, 1.2, 0.5, -0.8),
+    GROUPS["gauge"]: (0.006, -0.008),
+    MEMORY["lag"]: (0.4, 0.9, 2.1),
+    MEMORY["lag_seconds"]: (0.3, 0.1, 0.05),
+    MEMORY["play"]: (0.03, 0.01, 0.05),
 }
+# By name, in units of the rod.
+KNOWN = {name: value for names, values in _NUMBERS.items() for name, value in zip(names, values, strict=True)}
 PIN = Circle(0.3, 0.5, 0.02)
 MODES = (
     lambda s: 0.3 * (1.0 - s) ** 2,

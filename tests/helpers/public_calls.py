@@ -15,7 +15,6 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers import comparisons
 from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, swept
-from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.inference.point_load import infer_point_load
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
@@ -81,60 +80,18 @@ def right(function: Callable[..., Any], /, **arguments: Any) -> Call:
     return Call(function, {**defaults, **arguments})
 
 
-@functools.cache
-def ideal() -> xr.Dataset:
-    return swept(PARABOLA, step=0.1)
-
-
-@functools.cache
-def measured() -> xr.Dataset:
-    return CELL.measure(ideal(), rng=1)
-
-
-@functools.cache
-def target():
-    return tb.target(measured(), rig=STATED)
-
-
-@functools.cache
-def scanned():
-    return tb.scan(PARABOLA, drive_step=0.1)
-
-
-@functools.cache
-def posterior() -> xr.DataTree:
-    """A posterior of a few draws: enough for every figure and summary, not for numbers."""
-    return infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF)
-
-
-@functools.cache
-def contacts_drawn() -> xr.DataTree:
-    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40)
-
-
-@functools.cache
-def contacts() -> xr.Dataset:
-    return tb.reconstruct(measured(), method="constrained", rig=Rig(load_cell=CELL))
-
-
-@functools.cache
-def implied() -> xr.DataTree:
-    return tb.uncertainty.implied_contacts(posterior(), draws=10)
-
-
-@functools.cache
-def band() -> xr.Dataset:
-    return tb.contour_band(posterior(), np.linspace(-0.3, 0.3, 5))
-
-
-@functools.cache
-def gap() -> xr.Dataset:
-    return tb.gap(posterior())
-
-
-@functools.cache
-def plan() -> tb.planning.Plan:
-    return tb.planning.Plan(PARABOLA, rig=STATED, drive=COARSE)
+ideal = functools.cache(lambda: swept(PARABOLA, step=0.1))
+measured = functools.cache(lambda: CELL.measure(ideal(), rng=1))
+target = functools.cache(lambda: tb.target(measured(), rig=STATED))
+scanned = functools.cache(lambda: tb.scan(PARABOLA, drive_step=0.1))
+# A posterior of a few draws: enough for every figure and summary, not for numbers.
+posterior = functools.cache(lambda: infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF))
+contacts_drawn = functools.cache(lambda: tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40))
+contacts = functools.cache(lambda: tb.reconstruct(measured(), method="constrained", rig=Rig(load_cell=CELL)))
+implied = functools.cache(lambda: tb.uncertainty.implied_contacts(posterior(), draws=10))
+band = functools.cache(lambda: tb.contour_band(posterior(), np.linspace(-0.3, 0.3, 5)))
+gap = functools.cache(lambda: tb.gap(posterior()))
+plan = functools.cache(lambda: tb.planning.Plan(PARABOLA, rig=STATED, drive=COARSE))
 
 
 @functools.cache
@@ -143,14 +100,10 @@ def plan_si() -> tb.planning.Plan:
     return tb.planning.Plan(tb.contours.Parabola(5.0, 0.05), rig=rig, drive=COARSE)
 
 
-@functools.cache
-def sensitivity() -> xr.DataTree:
-    return tb.sensitivity(PARABOLA, rng=1, rig=STATED, drive=COARSE, samples=8)
-
-
-@functools.cache
-def designed() -> xr.Dataset:
-    return tb.design(posterior(), drives=[tb.Rotation((0.0, y), drive_step=0.1) for y in (0.0, -0.1)], draws=2, rng=1)
+sensitivity = functools.cache(lambda: tb.sensitivity(PARABOLA, rng=1, rig=STATED, drive=COARSE, samples=8))
+designed = functools.cache(
+    lambda: tb.design(posterior(), drives=[tb.Rotation((0.0, y), drive_step=0.1) for y in (0.0, -0.1)], draws=2, rng=1)
+)
 
 
 @functools.cache
@@ -165,9 +118,7 @@ def rods_required() -> xr.Dataset:
     return tb.planning.required_rod(plan_si(), **options)
 
 
-@functools.cache
-def inspected() -> Inspection:
-    return tb.inspect_record(measured(), rig=Rig(load_cell=CELL))
+inspected = functools.cache(lambda: tb.inspect_record(measured(), rig=Rig(load_cell=CELL)))
 
 
 def stream() -> tb.Stream:

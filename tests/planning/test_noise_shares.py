@@ -1,4 +1,4 @@
-"""Whose noise it is: functions with known indices, first order at small noise, and what is refused."""
+"""Whose noise it is: first order at small noise, and what is refused."""
 
 from dataclasses import replace
 
@@ -11,52 +11,12 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import SOURCES, amplification
-from tactile_bayes.planning.noise_shares import first_and_total, noise_shares
+from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
 QUIET = Plan(PROFILE, Rig(load_cell=tb.LoadCell(force_noise=5e-6, moment_noise=2e-6, drive_angle_noise=2e-6)))
-
-
-def ishigami(x):
-    one, two, three = x
-    return np.sin(one) + 7.0 * np.sin(two) ** 2 + 0.1 * three**4 * np.sin(one)
-
-
-def known_indices():
-    """Of Ishigami's function (Ishigami and Homma 1990): first order and total."""
-    pi4, pi8 = np.pi**4, np.pi**8
-    of_one, of_two = 0.5 * (1.0 + 0.1 * pi4 / 5.0) ** 2, 49.0 / 8.0
-    both = 0.01 * pi8 * (1.0 / 18.0 - 1.0 / 50.0)
-    whole = of_one + of_two + both
-    return np.array([of_one, of_two, 0.0]) / whole, np.array([of_one + both, of_two, both]) / whole
-
-
-def test_indices_of_known_functions():
-    """Means over 16 seeds, within 4.5 of their standard errors: 12 numbers, false alarms in less than 1 of 200 runs."""
-    laws, slopes = [stats.uniform(-np.pi, 2.0 * np.pi)] * 3, np.array([1.0, 2.0, 0.5])
-
-    def functions(x):
-        """Ishigami's, and a linear one."""
-        return np.stack([ishigami(x), slopes @ x])
-
-    found = np.array([first_and_total(functions, laws, 1024, seed) for seed in range(16)])
-    mean, error = found.mean(axis=0), found.std(axis=0, ddof=1) / 4.0
-    linear = slopes**2 / np.sum(slopes**2)
-    first, total = known_indices()
-    right = np.array([[first, linear], [total, linear]])
-    assert error.max() < 0.005
-    # An estimator of a ratio is biased by about the square of its scatter.
-    assert np.all(np.abs(mean - right) < 4.5 * error + 1e-3), (mean - right) / error
-
-
-def test_indices_of_normal_and_outlying_numbers():
-    """Of a linear function: shares of the variances. Squares of Student's t converge slowly: to 0.03 for ν = 10."""
-    laws = [stats.norm(0.0, 2.0), stats.t(10.0, scale=1.0)]
-    variances = np.array([4.0, 10.0 / 8.0])
-    for indices in first_and_total(lambda x: (x[0] - x[1])[None], laws, 4096, rng=1):
-        np.testing.assert_allclose(indices[0], variances / variances.sum(), atol=0.03)
 
 
 def test_shares_at_small_noise_are_those_of_first_order():
@@ -70,10 +30,12 @@ def test_shares_at_small_noise_are_those_of_first_order():
     for error in ("along", "across"):
         gains = grown[f"gain_{error}"].values[:, where]
         noises = [stats.norm(0.0, size) for size in sizes]
-        indices = first_and_total(gains.reshape(-1, 4).__matmul__, noises, 64, 1)
-        for name, right in zip(("share", "total_share"), indices, strict=True):
+        right = stats.sobol_indices(
+            func=gains.reshape(-1, 4).__matmul__, n=64, dists=noises, rng=np.random.default_rng(1)
+        )
+        for name, indices in (("share", right.first_order), ("total_share", right.total_order)):
             made = found[name].sel(error=error).values
-            np.testing.assert_allclose(made, right.reshape(made.shape), rtol=0.0, atol=1e-3)
+            np.testing.assert_allclose(made, indices.reshape(made.shape), rtol=0.0, atol=1e-3)
         # Root mean squares of 384 numbers of a scrambled sequence: within 4.5 standard errors of as many random ones.
         sd = np.sqrt(np.sum((gains * sizes) ** 2, axis=-1))
         np.testing.assert_allclose(found.rms_error.sel(error=error).values, sd, rtol=4.5 / np.sqrt(2.0 * 384))

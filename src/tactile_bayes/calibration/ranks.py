@@ -30,8 +30,7 @@ class NoticedRanks(NamedTuple):
 def uniformity_p_value(ranks: ArrayLike, top: int) -> float:
     """Return the probability that uniform ranks, from 0 to `top`, are as far from uniform as these, shape (n,).
 
-    At each rank the share of ranks up to it is binomial; the statistic is the least probable of these shares, as in
-    simultaneous bands for empirical distributions (Säilynoja, Bürkner & Vehtari 2022, doi 10.1007/s11222-022-10090-6).
+    The statistic is the least probable binomial share of ranks up to one (doi 10.1007/s11222-022-10090-6).
     """
     below = np.cumsum(np.bincount(np.asarray(ranks, dtype=np.intp), minlength=top + 1))
     least, null = _least_probability(below[:-1], int(below[-1])), _null(int(below[-1]), top)
@@ -83,10 +82,9 @@ def _rank_probabilities(top: int, shift: float, scale: float) -> Floats:
 
 
 def _power(count: int, probabilities: Floats, level: float) -> float:
-    """Return the probability that `uniformity_p_value` of ranks with these probabilities is at most a level.
+    """Return the exact probability that `uniformity_p_value` of ranks with these probabilities is at most a level.
 
-    It is exact: numbers of ranks up to each rank are a Markov chain, sums of independent Poisson numbers given their
-    total, which is followed as long as it stays within the bounds of the level.
+    Numbers of ranks up to each rank are a Markov chain, sums of Poisson numbers given their total.
     """
     top = probabilities.size - 1
     null = _null(count, top)

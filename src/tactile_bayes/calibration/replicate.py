@@ -167,11 +167,9 @@ def compared(
 def _ranks(
     model: ContourModel, result: Sampled, truth: Mapping[str, float], is_of_family: bool, rng: np.random.Generator
 ) -> dict[str, int]:
-    """Rank the true parameters and their log-likelihood among the draws.
+    """Rank the true parameters and their log-likelihood among draws picked at random: neighbours are correlated.
 
-    The draws are picked at random, since neighbours in a walker's history are correlated. A contour outside the
-    family has no true parameters. What has no true value has no rank, nor has one at an end of its prior, beyond which
-    there are no draws.
+    What has no true value has no rank, nor has one at an end of its prior, beyond which there are no draws.
     """
     picked = _picked(_points(result), DRAWS, rng)
     first = 0 if is_of_family else len(model.family.parameters)

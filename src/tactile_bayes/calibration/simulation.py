@@ -78,8 +78,7 @@ _NOISES = ("force_noise", "moment_noise", "relative_noise")
 def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, float]) -> dict[str, float]:
     """Return the true values of parameters by name, those drawn first, relative to the rod and load cell assumed.
 
-    Left out is what has none: a noise scale if channels differ, noise of a cell that states none, the length of a
-    discrepancy that is not simulated, modes of a trace if the rod is not what it says, parameters of another family.
+    Left out is what has none, like a noise scale if channels differ in it, and parameters of another family.
     """
     known = {**simulated.own_family.known, **simulated.unknowns.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)

@@ -47,9 +47,7 @@ class LeftOut(NamedTuple):
 def predicted_samples(problem: ContourProblem, sampled: Sampled, *, seed: Seed, settings: SamplerSettings) -> LeftOut:
     """Return the leave-one-out densities of a record, of a sample's channels together in units of EI/L and EI/L².
 
-    Next to first contact and snap-off the posterior has none of the contours that the record without a sample allows:
-    these samples are predicted from a posterior without any of them, and have no k̂. If the load cell drifts or has an
-    unknown bias, or beside a discrepancy, they are NaN.
+    Samples at events are predicted from a posterior without any of them, and have no k̂; NaN if they are correlated.
     """
     model = problem.model
     logs = _densities(model, sampled.draws)
@@ -122,9 +120,7 @@ def left_out(log_densities: Floats) -> LeftOut:
 def left_out_from_wider(log_densities: Floats, chosen: int) -> tuple[float, float]:
     """Return the log-density of a sample i given all the others, and its error, from draws without it and others, E.
 
-    A sample beside a jump of the load excludes values alone, which draws of the whole posterior do not reach. From
-    log-densities (chains, draws, E) it is Σ_s w_s p(y_i | θ_s) / Σ_s w_s with w_s = Π_{j in E, j ≠ i} p(y_j | θ_s); NaN
-    where no draw has any weight. The error is infinite with fewer than 10 effective draws.
+    From (chains, draws, E) it is Σ_s w_s p(y_i | θ_s) / Σ_s w_s with w_s = Π_{j in E, j ≠ i} p(y_j | θ_s).
     """
     logs = np.asarray(log_densities, dtype=np.float64)
     log_weights, log_density = np.delete(logs, chosen, axis=-1).sum(axis=-1), logs[..., chosen]

@@ -1,10 +1,4 @@
-"""Diagnostics of a record and of a result.
-
-`findings`          the table of what may be wrong, in sentences
-`inspection`        inspects a record before anything is inferred from it
-`result_check`      checks a result and its assumptions
-`predictive_check`  compares a record with what its posterior predicts
-"""
+"""Diagnostics of a record and of a result."""
 
 from tactile_bayes.diagnostics.findings import Finding
 from tactile_bayes.diagnostics.inspection import Inspection, inspect_record

@@ -21,8 +21,7 @@ _MOST = 0.1
 def cut_off_parameters(posterior: xr.DataTree) -> dict[str, str]:
     """Return the parameters whose posterior ends where the rod has no path, each with that end, the clearest first.
 
-    Draws are displaced along the regression of all parameters on one of them. Its own bounds, and the ends of its
-    prior, do not count.
+    Draws are displaced along the regression of all parameters on one; its own bounds and prior's ends do not count.
     """
     if "gauge" in posterior.attrs:
         return {}

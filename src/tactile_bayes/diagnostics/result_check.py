@@ -408,8 +408,7 @@ def _contradictions(result: _Result, contacts: xr.Dataset | None, noisier: float
 def _beyond_prior(result: _Result) -> dict[str, str]:
     """Return parameters whose posterior lies where the prior has almost no mass, each with its values as text.
 
-    A zero that was not tared is ordinary: it is left out where the record determines it, so that the prior moves it
-    little.
+    A zero that was not tared is ordinary: it is left out where the prior moves it little.
     """
     prior, said = result.posterior["prior"].to_dataset(), {}
     for name, values in result.draws.data_vars.items():

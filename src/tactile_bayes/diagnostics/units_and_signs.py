@@ -18,11 +18,9 @@ _LONGEST_LEVER = 2.0  # moment over force, in L, above which units are doubted: 
 
 
 def unit_and_sign_findings(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[Finding, ...]:
-    """Report units and signs of loads that are probably wrong, without any assumption on the contour.
+    """Report units and signs of loads that are probably wrong, by a cell or else the record's data sheet.
 
-    Known errors of the load cell, by default that of the record's data sheet, are corrected first. The lever arm of the
-    contact force is at most L, so that |m0| ≤ f L with or without friction. In tangential contact √f s1 ≤ 2 K(1/2), so
-    that f ≤ 13.8/s1² in EI/L². The object lies above the pivot, so that fAy > 0.
+    Whatever the contour, |m0| ≤ f L, f ≤ 13.8/s1² in EI/L² in tangential contact, and fAy > 0.
     """
     measured = validate(measured)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()

@@ -61,9 +61,7 @@ class _Forward(NamedTuple):
 def amplification(plan: Plan) -> xr.Dataset:
     """Return the errors of contact points due to errors of the sensor, to first order, in closed form.
 
-    Raw Step 2 is a function of four numbers, whose derivatives follow from the closed form (`place_by_wrench` of
-    `contact_coordinates`). The constrained estimate is, to first order, the weighted least-squares solution on the
-    surface of possible contacts.
+    The constrained estimate is the weighted least-squares solution on the surface of possible contacts.
     """
     return contact_errors(_refined(plan))
 

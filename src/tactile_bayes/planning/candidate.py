@@ -24,7 +24,6 @@ from tactile_bayes.planning.expected_band import (
     band_factor,
     deviation_of_heights,
     height_slopes,
-    heights_of,
     joined_arcs,
     mean_of_known,
 )
@@ -32,6 +31,7 @@ from tactile_bayes.planning.knowledge import COARSE, STEP, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
+from tactile_bayes.uncertainty.offsets import heights_of
 from tactile_bayes.uncertainty.quantiles import central_levels
 
 # Degrees of freedom of the t distribution from which nested draws come, and its scale over that of Laplace's
@@ -186,7 +186,7 @@ def _nested(
     logs, evidence = weighed(densities(points).sum(axis=1) + log_known - density - proposal.constant)
     weights = np.exp(logs)
     likely = weights > 0.0
-    heights = heights_of(model, points[likely], question.x)
+    heights = heights_of(model.contours(points[likely]), question.x)
     width = mean_of_known(_band_widths(heights, weights[likely], question.probability))
     return width, float(densities(point[None]).sum() - evidence), float(effective_number(weights))
 
@@ -208,9 +208,8 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
     widths, known = np.full(heights.shape[1], np.nan), ~np.isnan(heights).all(axis=0)
     of_each = np.broadcast_to(weights[:, None], heights[:, known].shape)
     levels = central_levels(probability)[::2]
-    widths[known] = np.ptp(
-        np.nanquantile(heights[:, known], levels, axis=0, weights=of_each, method="inverted_cdf"), axis=0
-    )
+    ends = np.nanquantile(heights[:, known], levels, axis=0, weights=of_each, method="inverted_cdf")
+    widths[known] = np.ptp(ends, axis=0)
     return widths
 
 

@@ -16,6 +16,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.record_information import STEP
 from tactile_bayes.sweep import Scan
+from tactile_bayes.uncertainty.offsets import heights_of
 
 _GRID_POINTS = 25  # number of grid points in every stretch
 
@@ -54,18 +55,12 @@ def band_factor(probability: float) -> float:
     return 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
 
 
-def heights_of(model: ContourModel, points: Floats, x: Floats) -> Floats:
-    """Return the heights at x [length] of contours with parameters of shape (n, d), shape (n, x)."""
-    contours = model.contours(points).take(np.arange(len(points))[:, None])
-    return np.asarray(np.broadcast_to(contours.height(x), (len(points), x.size)))
-
-
 def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
     """Return the derivatives of the contour's heights at x [length] by all parameters, shape (x, d)."""
     own = len(model.family.parameters)
     slopes = np.zeros((x.size, point.size))
     scale = np.maximum(np.abs(point[:own]), 1e-3 * model.likelihood.rod.length)
-    slopes[:, :own] = central_slopes(lambda points: heights_of(model, points, x), point[:own], STEP * scale)
+    slopes[:, :own] = central_slopes(lambda points: heights_of(model.contours(points), x), point[:own], STEP * scale)
     return slopes
 
 

@@ -16,9 +16,7 @@ from tactile_bayes.record import CHANNELS, COLUMNS
 def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     """Return bounds on the standard deviation of every parameter, and the contributions of channels and samples.
 
-    No unbiased estimate has a smaller standard deviation than the Cramér-Rao bound, and for small noise a posterior is
-    as wide as the bound with the priors added (Bernstein-von Mises theorem). The bounds are of first order and exclude
-    the information of the snap-off itself: see `record_information`.
+    For small noise a posterior is as wide as the Cramér-Rao bound with the priors added; see `record_information`.
     """
     model, point = plan.model, plan.point
     whole = record_information(model, point, slopes=plan.reading_slopes)

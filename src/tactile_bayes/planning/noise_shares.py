@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,11 +32,9 @@ _ERRORS = ("along", "across")
 def noise_shares(
     plan: Plan, *, rng: Rng, samples: int = 1024, states: int = 15, methods: tuple[Method, ...] = METHODS
 ) -> xr.Dataset:
-    """Return the shares of each reading's noise in the variance of a contact's error (Sobol' 2001).
+    """Return the shares of each reading's noise in the variance of a contact's error, as `reconstruct` makes it.
 
-    The noises of the three channels and of the encoder are independent, and the error is that of `reconstruct`, however
-    nonlinear. To first order every share is gain² σ² over the sum of these, and shares sum to one; a smaller sum comes
-    from interactions of noises. The estimators are those of `scipy.stats.sobol_indices`.
+    To first order every share is gain² σ² over the sum of these; shares of sum below one come from interactions.
     """
     if check_whole_number("samples", samples, 2, "give a power of two, like 1024") & (samples - 1):
         raise ParameterError(f"samples is {samples!r}: give a power of two, like 1024")
@@ -59,14 +56,14 @@ def noise_shares(
             evaluated.append(found)
             return np.nan_to_num(found).reshape(-1, drawn.shape[1])
 
-        found = first_and_total(errors, distributions, int(samples), seed)
+        indices = stats.sobol_indices(func=errors, n=int(samples), dists=distributions, rng=generator(seed))
         every = np.concatenate(evaluated, axis=-1)
         missing = np.isnan(every)
         lost[m] = np.mean(missing[:, 0], axis=-1)
         with np.errstate(invalid="ignore"):
             rms[m] = np.sqrt(np.nansum(every**2, axis=-1) / (~missing).sum(axis=-1))
         answered = np.asarray(~np.any(missing, axis=-1))
-        for out, index in zip((first, total), found, strict=True):
+        for out, index in ((first, indices.first_order), (total, indices.total_order)):
             out[m] = np.where(answered[..., None], index.reshape(shape[1:]), np.nan)
     length, along = {"units": COLUMNS["base_x"].unit_in(quiet.attrs["units"])}, {"units": travel_unit(quiet)}
     dims = ("reconstruction", "sample", "error")
@@ -84,14 +81,6 @@ def noise_shares(
         coords={"reconstruction": list(methods), "error": list(_ERRORS), "source": sources},
         attrs={"seed": seed_words(seed), "samples": int(samples)},
     )
-
-
-def first_and_total(
-    function: Callable[[Floats], Floats], distributions: Sequence[Any], samples: int, rng: Rng
-) -> tuple[Floats, Floats]:
-    """Return first-order and total Sobol' indices of a function's values, shape (values, inputs) each."""
-    found = stats.sobol_indices(func=function, n=samples, dists=distributions, rng=generator(rng))
-    return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)  # SciPy squeezes a single value
 
 
 def _distribution(plan: Plan, source: str, deviation: float) -> Any:

@@ -142,11 +142,9 @@ def record_information(
     slopes: ReadingSlopes | None = None,
     load_cell: LoadCell | None = None,
 ) -> RecordInformation:
-    """Return the expected (Fisher) information at a point of the model's parameters.
+    """Return Fisher's information, JᵀΣ⁻¹J, at a point of the model's parameters. Shapes: point (d,), channels (3,).
 
-    For normal errors it is JᵀΣ⁻¹J, with J the derivatives of the readings; for Student's t with ν degrees of freedom it
-    is smaller by (ν + 1)/(ν + 3), with Σ of the scale. Not counted are what the snap-off excludes, the dependence of
-    noise on loads, and a discrepancy; that about the noise scale is of white noise. Shapes: point (d,), channels (3,).
+    Not counted are what the snap-off excludes, the dependence of noise on loads, and that about a discrepancy.
     """
     cell = model.likelihood.load_cell if load_cell is None else load_cell.dimensionless(model.likelihood.rod)
     cell = scaled_cell(cell, model.noise_scale(point[None])[0])
@@ -154,7 +152,7 @@ def record_information(
     loads, by_parameters, by_angle = reading_slopes(model, point) if slopes is None else slopes
     white = whitening(cell, loads, by_angle, present, model.discrepancy_at(point))(by_parameters)
     nu = cell.degrees_of_freedom
-    if not math.isinf(nu):  # the covariance is wider than the scale by ν/(ν − 2)
+    if not math.isinf(nu):  # (ν + 1)/(ν + 3) of a normal one; the covariance is wider than the scale by ν/(ν − 2)
         white = white * math.sqrt((nu + 1.0) / (nu + 3.0) * nu / (nu - 2.0))
     every = np.zeros((*white.shape[:2], point.size))
     every[..., : len(model.forward_parameters)] = white

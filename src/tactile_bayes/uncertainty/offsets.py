@@ -153,8 +153,7 @@ def normal_offsets(contours: Contour, feet: Feet | Locus, moves: Moves | None = 
 def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
     """Return the signed distance of each contour from its own point along the normal there.
 
-    Until its tangent turns by a right angle from the foot's, a contour meets the normal at most once, going into the
-    object.
+    Until its tangent turns by a right angle from the foot's, a contour meets the normal at most once.
     """
     sin, cos = np.sin(slope_angle), np.cos(slope_angle)
     every = np.arange(x.size)

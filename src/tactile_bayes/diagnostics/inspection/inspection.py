@@ -231,8 +231,7 @@ def _with_zero(cell: LoadCell | None, found: xr.Dataset) -> LoadCell:
 def shown_rig(found: Inspection, rig: Rig) -> Rig:
     """Return the rig of an inspected record, with what its unloaded samples show and nobody states.
 
-    That is the noise, and zeros that are clearly off and stay where they are: they are added to the columns of the
-    file.
+    That is the noise, and zeros that are clearly off and stay where they are, as they are added to columns of the file.
     """
     columns = {name: column_entry(found.record[name], added=-zero) for name, zero in _zeros(found)}
     columns = {name: text for name, text in columns.items() if text}

@@ -59,10 +59,9 @@ def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
 
 
 def position_scatter(reading: Floats, stretches: list[Index], positions: list[Index]) -> tuple[float, float, float]:
-    """Return the scatter of the means of unloaded positions, of readings of shape (samples,) and positions of each.
+    """Return the scatter of the means of unloaded positions, the same by the noise of single readings, and its p-value.
 
-    It is the standard deviation about the mean of the stretch, the same if only the noise of single readings causes it,
-    and the p-value of that (analysis of variance); NaN where the drive does not stop, or positions are too few.
+    The p-value is that of an analysis of variance; NaN where the drive does not stop, or positions are too few.
     """
     between, within, square, places, samples, groups = 0.0, 0.0, 0.0, 0, 0, 0
     for rows, stops in zip(stretches, positions, strict=True):
@@ -92,13 +91,9 @@ _USUAL = 0.2  # largest share of uneven steps: with more of them, the drive is m
 
 
 def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step: float, *, false_alarm: float) -> Flags:
-    """Flag readings far from their unloaded stretch, or, in contact, from both neighbours on either side.
+    """Flag readings, shape (n_samples,), far from their unloaded stretch, or, in contact, from all of four neighbours.
 
-    The deviation of an unloaded reading from the median, over the median absolute deviation, is compared with a
-    quantile of Student's t with the effective degrees of freedom of that estimate. A loaded reading must, in addition,
-    lie outside of its four neighbours by twice their range: no slope, kink or snap-off does that.
-
-    Shapes: reading (n_samples,).
+    A loaded reading must lie outside of its four neighbours by twice their range: no slope, kink or snap-off does that.
     """
     flags = np.zeros(reading.size, dtype=bool)
     residual, spread = centred(reading, stretches)
