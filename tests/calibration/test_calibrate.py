@@ -4,19 +4,14 @@ import importlib
 import inspect
 import json
 import re
-import subprocess
-import sys
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from helpers.refusals import refused
-from helpers.replicates import STAGES, failing
-from helpers.tasks import wait_until
+from helpers.tasks import StrangeError
 from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate, experiment_of
 from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.replicate import REPLICATES, Outcome
@@ -96,6 +91,22 @@ def test_workers_change_nothing_but_the_seconds(small):
     found, _ = small
     other = quickly(settings=FEW_STEPS, workers=2)
     assert other.drop_vars("seconds").identical(found.drop_vars("seconds"))
+
+
+# Functions that fail in replicates 0, 1 and 2, and what their errors say.
+STAGES = {"simulate": "of the simulation", "sampled": "of inference", "_snap_offs": "of what comes after"}
+
+
+def failing(task):
+    """A replicate, where the first three fail, each at another stage, with an error that nobody expects."""
+    with pytest.MonkeyPatch.context() as patch:
+        for stage, words in list(STAGES.items())[task[1] : task[1] + 1]:
+
+            def fail(*arguments, words=words, **options):
+                raise StrangeError("an error", words)
+
+            patch.setattr(making, stage, fail)
+        return making.replicate(task)
 
 
 def test_a_failure_is_an_outcome_whatever_it_comes_from(tmp_path, monkeypatch):
@@ -221,33 +232,6 @@ def test_more_replicates_begin_with_those_that_are_there(noted, tmp_path):
     (tmp_path / REPLICATES.file).write_text(json.dumps(table))
     assert quickly(replicates=5, out=tmp_path).identical(whole)
     assert noted[5:] == [1]  # a gap is filled
-
-
-ENDLESS = """
-import sys, time
-from calibration.test_calibrate import made_up, module, quickly
-
-def slowly(task):
-    time.sleep(0.002)
-    return made_up(task)
-
-module.replicate = slowly
-quickly(replicates=10**5, out=sys.argv[1])
-"""
-
-
-@pytest.mark.slow
-def test_a_killed_run_goes_on(tmp_path):
-    """Whenever it is killed, what is noted is whole."""
-    run = subprocess.Popen([sys.executable, "-c", ENDLESS, str(tmp_path)], cwd=Path(__file__).parents[1])
-    wait_until(lambda: (tmp_path / REPLICATES.file).exists() or run.poll() is not None, seconds=60.0)
-    time.sleep(0.2)
-    run.kill()
-    run.wait()
-    done, told = len(rows_of(tmp_path)), []
-    found = quickly(replicates=done, out=tmp_path, workers=Workers(1, told.append))
-    assert (found.sizes["replicate"], told) == (done, [])
-    assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
 
 
 @pytest.mark.parametrize(

@@ -229,13 +229,6 @@ def test_noise_is_what_the_load_cell_that_measures_makes():
     assert abs(np.mean(deviations**2) - 1.0) < 5.0 * np.sqrt(2.0 / deviations.size)  # false alarm 1e-6
 
 
-def test_bias_and_gain_of_the_cell_that_measures():
-    gain = ((1.1, 0.0, 0.0), (0.0, 1.0, 0.02), (0.0, 0.0, 0.9))
-    made = simulated(truth=real(replace(QUIET, bias=(0.1, 0.0, -0.2), gain=gain)))
-    expected = loads_of(scanned(made).record) @ np.array(gain).T + [0.1, 0.0, -0.2]
-    np.testing.assert_allclose(loads_of(made.measured), expected, atol=1e-8)
-
-
 def test_the_encoder_of_a_cell_that_is_told():
     """Its offset is read and known of; its noise is read, and the rod knows nothing of it."""
     cell = replace(QUIET, drive_angle_offset=0.05)

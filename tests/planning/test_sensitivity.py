@@ -60,23 +60,15 @@ def test_without_a_contour_it_is_profile_ii_scaled_to_the_rod():
 
 
 def test_words_say_the_numbers_in_the_units_of_the_record():
-    dimensionless, si = plain().attrs["words"], in_si().attrs["words"]
-    assert re.search(r" L along the contour.* EI/L²", dimensionless, re.DOTALL)
-    assert not re.search(r"\bmm\b|\bmN\b", dimensionless)
-    assert re.search(r" mm along the contour.*\d mN .*\d mN m ", si, re.DOTALL)
-    assert "EI/L" not in si
-    told = in_si()["information"]
+    assert not re.search(r"\bmm\b|\bmN\b", plain().attrs["words"])
+    assert "EI/L" not in in_si().attrs["words"]
     (line,) = words(in_si(), "expected width")
-    touched, gap = (1e3 * float(told[f"{kind}_width"]) for kind in ("touched", "gap"))
-    for part in ("95%", f"{touched:.3g} mm where", f"{gap:.3g} mm in the gap"):
-        assert part in line
-    needed = in_si()["required_noise"]
-    lines = words(in_si(), "^A mean band")
+    for kind in ("touched", "gap"):
+        assert f"{1e3 * float(in_si()['information'][f'{kind}_width']):.3g} mm " in line
+    needed, lines = in_si()["required_noise"], words(in_si(), "^A mean band")
     assert len(lines) == 5
     width, noise = 1e3 * float(needed.band_width[0]), 1e3 * float(needed.force_noise[0])
-    assert f"of {width:.3g} mm needs {noise:.2g} mN" in lines[0]
-    (line,) = words(in_si(), "Toward first contact")
-    assert "to the power of -1.0" in line
+    assert f"{width:.3g} mm needs {noise:.2g} mN" in lines[0]
 
 
 def test_words_name_the_channel_that_is_missed_most():

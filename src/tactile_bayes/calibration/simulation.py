@@ -23,6 +23,7 @@ from tactile_bayes.rig.parameters import GROUPS, parameter_named
 from tactile_bayes.rig.stated import by_channel, of_all_channels, rod_with, sensor_values
 
 _TRIALS = 200  # largest number of truths that are drawn until the simulated rig reaches one
+_NOISES = ("force_noise", "moment_noise", "relative_noise")
 
 
 class Simulation(NamedTuple):
@@ -70,9 +71,6 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     drawn = {name: float(value[0]) for name, value in values.items()}
     own = true_values(experiment.simulated, experiment.assumed, drawn)
     return Simulation(measured, own, contour, rig, events)
-
-
-_NOISES = ("force_noise", "moment_noise", "relative_noise")
 
 
 def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, float]) -> dict[str, float]:

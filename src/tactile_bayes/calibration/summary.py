@@ -17,6 +17,23 @@ from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniform
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 
 _MARGIN = 0.01  # error in probability that is allowed for quantiles of some hundred draws
+Conclusion = Literal["calibrated", "not calibrated", "undecided", "too few"]
+FEWEST = 20  # least number of replicates for which uniformity and coverage are tested
+POWER = 0.9  # probability with which the faults that a verdict names would have been detected
+_MOST_LOST = 0.01  # largest share of lost replicates of a calibrated posterior; coverage may be wrong by as much
+# Largest share of unconverged runs; beyond it, the limit of steps is tested instead of the posteriors.
+_MOST_UNCONVERGED = 0.05
+_NAMED = 5  # largest number of lost replicates whose numbers are stated
+FALSE_ALARM = 0.01  # largest probability that the verdict finds a fault in right posteriors
+# Statements that must hold with the stated probability: names and descriptions.
+CLAIMS = {
+    "pointwise_in_gap": "band, in the gap",
+    "pointwise_beside": "band, beside it",
+    "simultaneous_in_gap": "band as a whole, in the gap",
+    "simultaneous_beside": "band as a whole, beside it",
+    "contact_region": "contact regions",
+    "snap_off": "angle of snap-off",
+}
 
 
 def coverage_p_value(share: ArrayLike, count: int, probability: float, *, is_whole: bool) -> Floats:
@@ -46,16 +63,6 @@ def noticed_coverage(
     below = float(betaincinv(low[-1] + 1, count - low[-1], 1.0 - power)) if low.size else np.nan
     above = float(betaincinv(high[0], count - high[0] + 1, power)) if high.size else np.nan
     return below, above
-
-
-Conclusion = Literal["calibrated", "not calibrated", "undecided", "too few"]
-
-FEWEST = 20  # least number of replicates for which uniformity and coverage are tested
-POWER = 0.9  # probability with which the faults that a verdict names would have been detected
-_MOST_LOST = 0.01  # largest share of lost replicates of a calibrated posterior; coverage may be wrong by as much
-# Largest share of unconverged runs; beyond it, the limit of steps is tested instead of the posteriors.
-_MOST_UNCONVERGED = 0.05
-_NAMED = 5  # largest number of lost replicates whose numbers are stated
 
 
 @dataclass(frozen=True)
@@ -122,18 +129,6 @@ def lost_message(messages: Mapping[int, str]) -> str:
         f"{len(numbers)} lost, in which no claim holds: {first} ({kinds}). To see why, add --replicate {numbers[0]} "
         f"--debug to the command, or call calibration_replicate({numbers[0]}, …) with the options of calibrate."
     )
-
-
-FALSE_ALARM = 0.01  # largest probability that the verdict finds a fault in right posteriors
-# Statements that must hold with the stated probability: names and descriptions.
-CLAIMS = {
-    "pointwise_in_gap": "band, in the gap",
-    "pointwise_beside": "band, beside it",
-    "simultaneous_in_gap": "band as a whole, in the gap",
-    "simultaneous_beside": "band as a whole, beside it",
-    "contact_region": "contact regions",
-    "snap_off": "angle of snap-off",
-}
 
 
 def summary(identity: Mapping[str, str], probability: float, outcomes: Mapping[int, Outcome]) -> xr.Dataset:

@@ -48,6 +48,9 @@ _HOPELESS = 20.0
 
 _KEPT_DRAWS = 2000  # largest number of draws of a contour that are kept of each family
 BY_DRAW = ("family", "contour_draw", "contour_parameter")
+# Beginning of the verdict if no family passes the check.
+NONE_FITS = "None fits: with the rig as assumed, the record does not look like one of any of these shapes"
+_LIKELY = 0.05  # smallest probability with which a family is named
 
 
 class _Tried(NamedTuple):
@@ -303,11 +306,6 @@ def _left_out(predicted: Sequence[LeftOut | None]) -> dict[str, Any]:
     }
     found: dict[str, Any] = {name: ("family", values) for name, values in of_families.items()}
     return found | {"log_density": (("family", "sample"), logs)}
-
-
-# Beginning of the verdict if no family passes the check.
-NONE_FITS = "None fits: with the rig as assumed, the record does not look like one of any of these shapes"
-_LIKELY = 0.05  # smallest probability with which a family is named
 
 
 def verdict_on(result: xr.Dataset) -> str:

@@ -123,6 +123,8 @@ TEXTS: Mapping[str, str] = {
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SHOWN = 5  # largest number of samples that a finding lists
+NOISE_FACTOR = 2.0  # ratio of found to stated noise beyond which it is reported: data sheets are no more accurate
+OFF_ZERO = 5.0  # standard errors by which a zero must differ from the stated one to be reported
 
 
 class Finding(str):
@@ -188,10 +190,6 @@ def of_sweeps(numbers: Sequence[int], verb: str, past: str = "") -> str:
     """Return text like "Sweeps 1 and 3 show", with the verb, or with its past form."""
     one = len(numbers) == 1
     return f"Sweep{'' if one else 's'} {joined(list(map(str, numbers)))} {past or verb + 's' * one}"
-
-
-NOISE_FACTOR = 2.0  # ratio of found to stated noise beyond which it is reported: data sheets are no more accurate
-OFF_ZERO = 5.0  # standard errors by which a zero must differ from the stated one to be reported
 
 
 def moved_zero(p_values: Mapping[str, float], false_alarm: float, known: Container[str] = ()) -> list[Finding]:

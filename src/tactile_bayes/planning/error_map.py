@@ -46,6 +46,14 @@ from tactile_bayes.uncertainty.band import contour_band
 # Settings of posteriors, which only need to yield a band.
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
 _FEWEST_WALKERS = 24
+_LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee")
+# Axes of the map beside the contours, with their usual values.
+_AXES = {"distance": (0.5,), "noise_factor": (0.1, 0.3, 1.0, 3.0)}
+# Lengths and shares in a cell, those of each reconstruction and the others.
+_LENGTHS_OF_METHODS = ("rms_along", "rms_across", "first_order_along", "first_order_across", "median_error")
+_SHARES_OF_METHODS = ("without_answer", "ok")
+_LENGTHS = ("gap_width", *(f"{of}_{kind}_width" for of in ("expected", "posterior") for kind in ("touched", "gap")))
+_SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_failed")
 
 
 @dataclass(frozen=True)
@@ -160,17 +168,6 @@ def _inferred(
 def _mean(values: Floats | Flags | Sequence[float]) -> float:
     """Return the mean of values; NaN if there are none."""
     return float(np.mean(values)) if np.size(values) else math.nan
-
-
-_LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee")
-
-# Axes of the map beside the contours, with their usual values.
-_AXES = {"distance": (0.5,), "noise_factor": (0.1, 0.3, 1.0, 3.0)}
-# Lengths and shares in a cell, those of each reconstruction and the others.
-_LENGTHS_OF_METHODS = ("rms_along", "rms_across", "first_order_along", "first_order_across", "median_error")
-_SHARES_OF_METHODS = ("without_answer", "ok")
-_LENGTHS = ("gap_width", *(f"{of}_{kind}_width" for of in ("expected", "posterior") for kind in ("touched", "gap")))
-_SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_failed")
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,8 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.sweep import Drive, Rotation, Scan, drives_of, scan
 
+SAMPLE_COLUMNS = ["sweep", "direction", "base_x", "base_y", "drive_angle"]  # columns of a record that results repeat
+
 
 def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
     """Return the name of a contour's family, as in `infer_contour`, and its parameters."""
@@ -61,9 +63,6 @@ def enlarged(contour: Contour, factor: float) -> Contour:
     name, values = family_parameters(contour)
     family = family_named(name)
     return family.build(*(values[p] * factor ** family.length_powers[p] for p in family.parameters))
-
-
-SAMPLE_COLUMNS = ["sweep", "direction", "base_x", "base_y", "drive_angle"]  # columns of a record that results repeat
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,9 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.record import CHANNELS
 
+# Steps of finite differences, over the scale of each parameter: of exact loads, and of interpolated ones.
+STEP, COARSE_STEP = 1e-5, 1e-3
+
 
 class NoiseWhitening(NamedTuple):
     """Linear map of readings to independent ones of unit variance."""
@@ -76,10 +79,6 @@ def _wandering(cell: LoadCell, samples: int) -> Floats:
         lag = np.abs(index[:, None] - index)
         shared += cell.drift.decay ** lag[..., None] * variance[np.minimum(index[:, None], index)]
     return shared
-
-
-# Steps of finite differences, over the scale of each parameter: of exact loads, and of interpolated ones.
-STEP, COARSE_STEP = 1e-5, 1e-3
 
 
 class ReadingSlopes(NamedTuple):

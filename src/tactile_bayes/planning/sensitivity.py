@@ -24,6 +24,7 @@ from tactile_bayes.sweep import Drive
 PARTS = ("amplification", "information", "noise_shares", "required_noise")
 
 _WIDTHS = (0.0005, 0.001, 0.0025, 0.005, 0.01)  # default widths of bands [rod lengths]
+_NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "force_y", "drive_angle": "the drive angle"}
 
 
 def sensitivity(
@@ -115,9 +116,6 @@ def sensitivity(
         "words": "\n".join(sensitivity_summary(tree, plan.record.attrs["units"] != "dimensionless")),
     }
     return tree
-
-
-_NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "force_y", "drive_angle": "the drive angle"}
 
 
 def sensitivity_summary(tree: xr.DataTree, si: bool) -> Iterator[str]:

@@ -18,6 +18,8 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 from tactile_bayes.uncertainty.offsets import heights_of
 from tactile_bayes.uncertainty.quantiles import central_levels
 
+_GRID_POINTS = 101  # number of grid points of x across the gap
+
 
 class Triangle(NamedTuple):
     """Region of a convex contour between two of its points with known tangents, for each of n contours.
@@ -70,9 +72,6 @@ def triangle(left: Locus, right: Locus) -> Triangle:
         height,
         height / np.cos(chord),
     )
-
-
-_GRID_POINTS = 101  # number of grid points of x across the gap
 
 
 def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr.DataTree | None = None) -> xr.Dataset:

@@ -28,6 +28,11 @@ _FRAME_TEXTS = {
     "turning": f"the load cell turned with the drive ({rig_entry('frame', 'turning', 'load_cell')})",
     "fixed": f"the load cell did not turn with the drive ({rig_entry('frame', 'fixed', 'load_cell')})",
 }
+_FEWEST = 10  # number of loaded samples below which the fit is not judged
+_CORRECTED = 1 / 3  # share of the misfits that may remain for a correction to be named
+# Share of the samples that a further change must correct: loads that are mirrored twice fit as well as before.
+_CHANGE = 0.1
+_TRIED = 40  # largest number of loaded samples on which corrections are tried: where nothing fits, each takes long
 
 
 class Correction(NamedTuple):
@@ -109,13 +114,6 @@ def _angles(record: xr.Dataset) -> Iterator[tuple[str, Transform, int]]:
         if (sense, turns) == (-1, 1):  # mirrored in the diagonal
             text += f", {moment}, and force_x and force_y were exchanged"
             yield text, _in_turn(counted, other_moment, _exchanged), 3
-
-
-_FEWEST = 10  # number of loaded samples below which the fit is not judged
-_CORRECTED = 1 / 3  # share of the misfits that may remain for a correction to be named
-# Share of the samples that a further change must correct: loads that are mirrored twice fit as well as before.
-_CHANGE = 0.1
-_TRIED = 40  # largest number of loaded samples on which corrections are tried: where nothing fits, each takes long
 
 
 class Fit(NamedTuple):

@@ -55,6 +55,16 @@ _DIGITS = 3  # number of significant digits of a noise that is estimated
 _STATED = ("given", "data sheet")  # sources of a load cell that somebody states
 
 CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"]
+_FLAGS = {
+    "outlier": "whether the reading stands out from its neighbours",
+    "stuck": "whether the reading stays the same for long",
+    "cut_off": "whether the reading is at the end of a range",
+}
+_COLUMNS = (
+    *("smallest", "largest", "stated_noise", "stated_bias", "neighbour_correlation", "neighbour_score"),
+    *("position_noise", "position_noise_expected", "position_p_value"),
+)
+_FROM_ZERO_LOAD = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "resolution", "same_bias_p_value")
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,18 +265,6 @@ def _zeros(found: Inspection) -> Iterator[tuple[str, float]]:
         is_off = abs(zero) > OFF_ZERO * error > 0.0 and not is_stated
         if (name in far or is_off) and not has_moved:
             yield name, zero
-
-
-_FLAGS = {
-    "outlier": "whether the reading stands out from its neighbours",
-    "stuck": "whether the reading stays the same for long",
-    "cut_off": "whether the reading is at the end of a range",
-}
-_COLUMNS = (
-    *("smallest", "largest", "stated_noise", "stated_bias", "neighbour_correlation", "neighbour_score"),
-    *("position_noise", "position_noise_expected", "position_p_value"),
-)
-_FROM_ZERO_LOAD = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "resolution", "same_bias_p_value")
 
 
 def sample_table(

@@ -14,6 +14,14 @@ from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, robust_deviati
 from tactile_bayes.record import means_of_positions, positions_of
 
 _CUT = 4.0  # robust standard deviations at which residuals are clipped, so that no single outlier dominates
+_FEWEST = 8  # number of unloaded samples below which their scatter does not identify outliers
+_EFFICIENCY = 0.37  # efficiency of the median absolute deviation relative to the standard deviation, in normal noise
+_SHORTEST = 3  # smallest number of equal readings in a row that is reported
+_JUMP = 2.0  # distance of a loaded outlier from the range of its four neighbours, over that range
+_WIDER = 0.5  # difference of an uneven step from the usual step, over the usual step
+_MOST_DIGITS = 6  # largest number of significant digits of a written reading that can make noisy ones equal
+_WHOLE = 1e-6  # tolerated distance of a reading, in units of its last digit, from a whole number
+_USUAL = 0.2  # largest share of uneven steps: with more of them, the drive is meant to move so
 
 
 class Autocorrelation(NamedTuple):
@@ -78,16 +86,6 @@ def position_scatter(reading: Floats, stretches: list[Index], positions: list[In
     variance = within / free_within
     p_value = float(fdtrc(free, free_within, between / free / variance))
     return float(np.sqrt(square / free)), float(np.sqrt(variance * places / samples)), p_value
-
-
-_FEWEST = 8  # number of unloaded samples below which their scatter does not identify outliers
-_EFFICIENCY = 0.37  # efficiency of the median absolute deviation relative to the standard deviation, in normal noise
-_SHORTEST = 3  # smallest number of equal readings in a row that is reported
-_JUMP = 2.0  # distance of a loaded outlier from the range of its four neighbours, over that range
-_WIDER = 0.5  # difference of an uneven step from the usual step, over the usual step
-_MOST_DIGITS = 6  # largest number of significant digits of a written reading that can make noisy ones equal
-_WHOLE = 1e-6  # tolerated distance of a reading, in units of its last digit, from a whole number
-_USUAL = 0.2  # largest share of uneven steps: with more of them, the drive is meant to move so
 
 
 def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step: float, *, false_alarm: float) -> Flags:
