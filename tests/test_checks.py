@@ -5,7 +5,7 @@ import math
 import pathlib
 import re
 import warnings
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,8 +15,7 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers.public_calls import AcceptedError, ideal, posterior
 from helpers.wrong_values import CELL, WRONG
-from tactile_bayes import checks
-from tactile_bayes.checks import as_number, as_numbers, check_array, check_number, check_numbers, shown
+from tactile_bayes.checks import as_number, as_numbers, check_array, check_numbers, shown
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
 
 
@@ -319,65 +318,6 @@ def test_a_switch_takes_true_and_false_alone(calls):
 def test_numbers_are_numbers(value):
     assert as_number(value) == float(value)
     assert as_numbers(value) == float(value)
-
-
-REFUSALS = {
-    "number": (partial(check_number, least=0.0), [0, np.int8(3)], [-1.0, math.nan, "1", True, [1.0], 1j]),
-    "positive": (
-        checks.check_positive,
-        [math.ulp(0.0), np.array(2.0)],
-        [0.0, math.inf, None, np.bool_(True), np.ones(1)],
-    ),
-    "probability": (checks.check_probability, [0.4, np.float32(0.5)], [0.0, 1.0, math.nan, True, "0.5"]),
-    "share": (partial(checks.check_probability, below=0.5), [0.4], [0.5]),
-    "numbers": (check_numbers, [[1, 2.5], 3, []], [[1, "2"], [True, 1.0], [[1, 2], [3]], [math.inf], None, "12"]),
-    "list": (partial(check_numbers, shape=(None,), most=2.0), [[1, 2], (0.5,)], [[], 1.0, [[1.0]], [3.0]]),
-    "lever": (partial(check_numbers, shape=(2,)), [(0, 1)], [(0, 1, 2), (0,), [[0, 1]]]),
-    "base": (
-        checks.check_pivots,
-        [(0, 1), [(0, 1), (2, 1)]],
-        [(0, 1, 2), [], [(0, 1), (2,)], (0, math.nan), 1.0, "01"],
-    ),
-    "draws": (partial(checks.check_whole_number, least=2), [np.uint8(2), 3], [True, 2.0, "2", None, 1]),
-    "replicate": (lambda name, value: checks.check_whole_number(name, value, 0, most=9), [9], [10, -1, False]),
-    "method": (
-        lambda name, value: checks.check_choice(name, value, ("raw", "flat")),
-        ["raw"],
-        ["left", ["raw"], None, b"raw"],
-    ),
-    "rod": (partial(checks.check_optional, kind=tb.Rod), [None, tb.Rod()], [tb.Rod, 1.0, {}]),
-    "events": (checks.check_switch, [True, np.bool_(False)], [0, 1, None, "True"]),
-    "progress": (checks.check_function, [None, print], [1, "print"]),
-    "names": (
-        checks.check_names,
-        [["a", "b"], np.array(["a"]), {"a": 1}.keys()],
-        ["a", b"ab", {"a": 1}, ["a", 1], iter("ab")],
-    ),
-    "priors": (
-        partial(checks.check_mapping, correction="give names"),
-        [None, {}, {"q": 1}],
-        [{1: 2.0}, [], "q", xr.Dataset()],
-    ),
-    "path": (checks.check_path, ["record.csv", pathlib.Path("out")], ["", "\0", b"record.csv", 3, None]),
-}
-
-
-@pytest.mark.parametrize("name", REFUSALS)
-def test_a_check_takes_what_is_right_and_refuses_the_rest_by_name_and_with_a_correction(name):
-    check, right, wrong = REFUSALS[name]
-    for value in right:
-        check(name, value)
-    for value in wrong:
-        with pytest.raises(ParameterError, match=rf"(?s)^{name} is {re.escape(shown(value))}.*: .*(give|choose) "):
-            check(name, value)
-
-
-def test_checks_return_what_they_checked_as_it_is_used():
-    assert checks.check_whole_number("draws", np.uint8(2), 2) == 2
-    assert check_numbers("span", (0, 1)).tolist() == [0.0, 1.0]
-    assert checks.check_pivots("base", (0, 1)) == [(0.0, 1.0)]
-    assert checks.check_names("nuisances", np.array(["a", "b"])) == ["a", "b"]
-    assert checks.check_path("path", "record.csv") == pathlib.Path("record.csv")
 
 
 def test_what_is_long_is_shown_by_its_kind():

@@ -9,10 +9,10 @@ import xarray as xr
 from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.assessment.causes import causes, causes_beside
 from tactile_bayes.assessment.local_bends import PLACES, LocalBends, with_bends
-from tactile_bayes.calibration.misspecification import Misspecification
+from tactile_bayes.calibration.simulated_experiment import Misspecification
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.likely_causes import likely_causes
+from tactile_bayes.diagnostics.findings import likely_causes
 from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_problem import contour_problem

@@ -10,7 +10,7 @@ import tactile_bayes as tb
 from helpers.load_cells import CELL
 from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
-from tactile_bayes.calibration.misspecification import Misspecification
+from tactile_bayes.calibration.simulated_experiment import Misspecification
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError, ReachError

@@ -9,7 +9,6 @@ from helpers.contour_posteriors import CELL, swept
 from helpers.refusals import refused
 from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Ellipse, paper_profile
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.family import Family
 from tactile_bayes.rig import Rig
@@ -99,22 +98,6 @@ def test_an_interrupt_ends_the_comparison(circle):
     endless = SamplerSettings(ensembles=2, min_ess=1e9)
     with refused(KeyboardInterrupt, "circle"):
         compare_families(circle, ["circle", "ellipse"], RIG, rng=1, settings=endless, progress=interrupt)
-
-
-@pytest.mark.parametrize(
-    ("families", "named"),
-    [
-        ("circle", ["'circle'"]),
-        (Family("circle"), ["circle"]),
-        (3, ["3"]),
-        (["circle"], ["circle"]),
-        (["circle", Family("circle", r=0.8)], ["circle", "different"]),
-        (["circle", "cube"], ["'cube'"]),
-    ],
-)
-def test_what_cannot_be_compared_is_refused(circle, families, named):
-    with refused(ParameterError, *named):
-        compare_families(circle, families, RIG, rng=1)
 
 
 def test_families_of_which_something_is_said(circle):

@@ -92,15 +92,6 @@ def test_the_standard_error_is_the_scatter_of_estimates(kept, wider):
     assert ((stated > 0.7 * scatter) & (stated < 1.4 * scatter)).all()
 
 
-def test_stuck_chains_do_not_matter():
-    line = Line(24)
-    draws = wandering_draws(*line.posterior(), (4, 500), np.random.default_rng(3))
-    once = left_out(line.log_densities(draws))
-    found = left_out(line.log_densities(np.repeat(draws, 4, axis=1)))
-    assert (np.abs(found.log_density - [line.exact(i) for i in range(24)]) < SIGMAS * found.standard_error).all()
-    np.testing.assert_allclose(found.standard_error, once.standard_error, rtol=0.35)
-
-
 def test_a_sample_that_the_others_do_not_expect_is_told_by_its_tail():
     line = Line(12)
     line.design[0], line.y[0] = [1.0, 6.0, 6.0], 6.0

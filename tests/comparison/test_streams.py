@@ -10,7 +10,7 @@ from scipy.special import softmax
 import tactile_bayes as tb
 from helpers.load_cells import CELL
 from helpers.refusals import refused
-from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.parameters.priors import matched_priors
 
 RIG = tb.Rig(load_cell=CELL, unknown="nothing")
@@ -114,16 +114,3 @@ def test_families_of_which_something_is_said(measured):
     np.testing.assert_array_equal(draws[0, :, 1], 0.5)  # r, q, x_c
     np.testing.assert_array_equal(draws[1, :, 1], 0.4)  # a, b, q, x_c
     assert np.ptp(draws[1, :, 0]) > 0.0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        ({"families": "circle"}, ["'circle'"]),
-        ({"families": FAMILIES, "rig": "good"}, ["rig", "'good'"]),
-        ({"families": FAMILIES, "particles": 3}, ["particles", "3"]),
-    ],
-)
-def test_impossible_arguments_are_refused(arguments, named):
-    with refused(ParameterError, *named):
-        tb.comparison.StreamComparison(**(OPTIONS | arguments))

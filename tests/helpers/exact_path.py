@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpmath.calculus.quadrature import GaussLegendre
 
 from helpers.exact_rod import HALF, elastica, mp
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw, ShapeFree
@@ -123,7 +124,7 @@ def _shape_free(contour: ShapeFree) -> Piece:
     for row, i in ((0, 1), (last, last - 1)):
         system[row, i - 1], system[row, i], system[row, i + 1] = width[i], -width[i - 1] - width[i], width[i - 1]
     bends = mp.lu_solve(system, right_side)
-    nodes, weights = _gauss(36)
+    nodes, weights = zip(*GaussLegendre(mp).calc_nodes(5, mp.prec), strict=True)
 
     def radius(i: int, alpha: Number) -> Number:
         h, ahead, behind = width[i], knots[i + 1] - alpha, alpha - knots[i]
@@ -154,22 +155,6 @@ def _shape_free(contour: ShapeFree) -> Piece:
         return x + dx - x_at, y + dy - y_at, alpha
 
     return Piece(locate, knots[0], knots[-1], lambda x, y, alpha: alpha)
-
-
-def _gauss(count: int) -> tuple[list[Number], list[Number]]:
-    """Legendre's nodes and weights, polished from doubles."""
-    nodes, weights = [], []
-    for start in np.polynomial.legendre.leggauss(count)[0]:
-        x = mp.mpf(float(start))
-        for _ in range(3):
-            below, here = mp.mpf(1), x
-            for k in range(2, count + 1):
-                below, here = here, ((2 * k - 1) * x * here - (k - 1) * below) / k
-            slope = count * (x * here - below) / (x * x - 1)
-            x -= here / slope
-        nodes.append(x)
-        weights.append(2 / ((1 - x * x) * slope**2))
-    return nodes, weights
 
 
 class ExactState(NamedTuple):

@@ -165,15 +165,3 @@ def test_raw_errors_grow_like_one_over_the_distance_from_first_contact_and_not_t
         raw = grown[name].sel(reconstruction="raw")
         np.testing.assert_allclose(raw.sel(event="first contact").values, -1.0, atol=0.02)
         np.testing.assert_allclose(raw.sel(event="snap-off").values, 0.0, atol=0.02)
-
-
-def test_growth_is_what_single_samples_show():
-    plan = Plan(PROFILE, drive=tb.Rotation(direction="forward"))
-    first = plan.scan.sweeps[0].first_contact.drive_angle
-    near = amplification(plan.at_angles(first + np.array([1e-4, 2e-4, 0.5])))
-    raw = near.sel(reconstruction="raw")
-    np.testing.assert_allclose(raw.after_first_contact.values, [1e-4, 2e-4, 0.5], rtol=1e-9)
-    for sd in (raw.sd_along.values, raw.sd_across.values):
-        assert sd[0] / sd[1] == pytest.approx(2.0, rel=0.01)
-    assert not raw.holds.values[:2].any()  # and first order says so itself
-    assert np.isnan(near.growth_along.values).all()  # of three samples no power can be told

@@ -8,7 +8,7 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.refusals import refused
-from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import SOURCES, amplification
 from tactile_bayes.planning.noise_shares import noise_shares
@@ -40,16 +40,6 @@ def test_shares_at_small_noise_are_those_of_first_order():
         sd = np.sqrt(np.sum((gains * sizes) ** 2, axis=-1))
         np.testing.assert_allclose(found.rms_error.sel(error=error).values, sd, rtol=4.5 / np.sqrt(2.0 * 384))
     assert not found.without_answer.values.any()
-
-
-def test_shares_do_not_depend_on_the_unit():
-    rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
-    cell = tb.LoadCell(force_noise=5e-6 * rod.force_unit, moment_noise=2e-6 * rod.moment_unit, drive_angle_noise=2e-6)
-    plans = (Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod)), QUIET)
-    si, plain = (noise_shares(plan, rng=1, samples=64, states=2, methods=("raw",)) for plan in plans)
-    np.testing.assert_allclose(si.share.values, plain.share.values, rtol=0.0, atol=1e-4)
-    np.testing.assert_allclose(si.rms_error.values, 0.2 * plain.rms_error.values, rtol=1e-4)
-    assert si.rms_error.attrs["units"] == "m"
 
 
 def test_first_order_fails_at_large_noise_and_this_says_so():

@@ -12,9 +12,8 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.uncertainty.band import averaged_heights, contour_band, contour_heights, normal_band
+from tactile_bayes.uncertainty.band import averaged_heights, contour_band, contour_heights, normal_band, quantile_band
 from tactile_bayes.uncertainty.offsets import Feet, aligned, normal_offsets
-from tactile_bayes.uncertainty.quantiles import quantile_band
 
 X, NEAR = np.linspace(-0.8, 0.8, 41), np.linspace(-0.4, 0.4, 33)
 

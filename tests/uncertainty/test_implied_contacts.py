@@ -21,8 +21,7 @@ from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import in_frame, record_hash
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
-from tactile_bayes.uncertainty.contact_moments import contact_moments
-from tactile_bayes.uncertainty.contact_region import contact_region
+from tactile_bayes.uncertainty.contact_region import contact_moments, contact_region
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 
 COLUMNS = ("contact_x", "contact_y", "slope_angle", "contact_arclength")

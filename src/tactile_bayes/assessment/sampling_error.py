@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import contour_draws
-from tactile_bayes.uncertainty.band import contour_heights, grid_points, length_unit
-from tactile_bayes.uncertainty.quantiles import central_levels
+from tactile_bayes.uncertainty.band import central_levels, contour_heights, grid_points, length_unit
 
 WANTED_SHARE = 0.1  # Monte-Carlo error of an end over the width of the band, above which more draws are advised
 

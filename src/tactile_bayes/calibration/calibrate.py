@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.replicate import REPLICATES, Replicate, make_replicate, replicate, walkers_of
-from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
+from tactile_bayes.calibration.simulated_experiment import Misspecification, SimulatedExperiment
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.checks import check_optional, check_path, check_switch, check_whole_number, refused
 from tactile_bayes.inference.ensembles import SamplerSettings

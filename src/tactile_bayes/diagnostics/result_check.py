@@ -18,12 +18,12 @@ from tactile_bayes.diagnostics.findings import (
     OFF_ZERO,
     Finding,
     contradiction,
+    likely_causes,
     moved_zero,
     of_sweeps,
     quantity,
     zero_off,
 )
-from tactile_bayes.diagnostics.likely_causes import likely_causes
 from tactile_bayes.diagnostics.predictive_check import Residuals, predictive_check, residuals_of
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings

@@ -31,8 +31,8 @@ from tactile_bayes.planning.knowledge import COARSE, STEP, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
+from tactile_bayes.uncertainty.band import central_levels
 from tactile_bayes.uncertainty.offsets import heights_of
-from tactile_bayes.uncertainty.quantiles import central_levels
 
 # Degrees of freedom of the t distribution from which nested draws come, and its scale over that of Laplace's
 # approximation.

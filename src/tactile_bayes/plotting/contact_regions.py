@@ -130,8 +130,7 @@ def contact_regions(
     '$y$ [$L$]'
     """
     from tactile_bayes.inference.result import contact_draws
-    from tactile_bayes.uncertainty.contact_moments import LEAST_DRAWS
-    from tactile_bayes.uncertainty.contact_region import contact_region
+    from tactile_bayes.uncertainty.contact_region import LEAST_DRAWS, contact_region
 
     check_probability("probability", probability)
     numbers = checked_samples(samples)

@@ -80,7 +80,7 @@ def tightening(
     >>> tightening(implied, reconstruct(measured, method="constrained"))[-1].get_ylabel()
     'single sd / implied sd'
     """
-    from tactile_bayes.uncertainty.contact_moments import contact_moments
+    from tactile_bayes.uncertainty.contact_region import contact_moments
 
     check_probability("probability", probability)
     check_drawing(truth=truth)

@@ -2,8 +2,7 @@
 
 from tactile_bayes.uncertainty.band import contour_band, normal_band
 from tactile_bayes.uncertainty.budget import uncertainty_budget
-from tactile_bayes.uncertainty.contact_moments import contact_moments
-from tactile_bayes.uncertainty.contact_region import contact_region
+from tactile_bayes.uncertainty.contact_region import contact_moments, contact_region
 from tactile_bayes.uncertainty.gap import gap
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 from tactile_bayes.uncertainty.overlay import Overlay, overlay_distance, read_overlay

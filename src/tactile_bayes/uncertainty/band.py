@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.checks import as_numbers, refused
+from tactile_bayes.checks import as_numbers, check_probability, check_switch, refused
 from tactile_bayes.contours.base import Contour, check_single
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -19,10 +19,10 @@ from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import COLUMNS
 from tactile_bayes.uncertainty.offsets import Moves, aligned, feet_of, heights_of, most_central, normal_offsets
-from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach, reach
 
 _DRAWS = 4000
+_ROUNDING = 1e-9  # share of its largest width below which a band is so narrow that its draws differ only by rounding
 
 
 def contour_band(
@@ -258,3 +258,33 @@ def _counts(weights: Floats, most: int) -> Index:
     counts = np.floor(exact).astype(np.intp)
     counts[np.argsort(counts - exact, kind="stable")[: most - counts.sum()]] += 1
     return counts
+
+
+def central_levels(probability: float) -> tuple[float, float, float]:
+    """Return the quantile levels of the central interval's lower end, the median, and its upper end."""
+    check_probability("probability", probability)
+    return 0.5 * (1.0 - probability), 0.5, 0.5 * (1.0 + probability)
+
+
+def quantile_band(values: Floats, probability: float, simultaneous: bool = False) -> Floats:
+    """Return lower edge, median and upper edge of draws on a grid.
+
+    Shapes: values (draws, grid points) → (3, grid points).
+    """
+    levels = central_levels(probability)
+    check_switch("simultaneous", simultaneous)
+    band = np.full((3, values.shape[1]), np.nan)
+    known = np.isfinite(values).all(axis=0)
+    if not known.any():
+        return band
+    lower, median, upper = np.quantile(values[:, known], levels, axis=0)
+    if simultaneous:
+        off = values[:, known] - median
+        reach = np.where(off > 0.0, upper - median, median - lower)
+        widest = float(np.max(upper - lower))
+        if widest > 0.0:
+            most = (np.abs(off) / np.maximum(reach, _ROUNDING * widest)).max(axis=1)
+            factor = max(1.0, float(np.quantile(most, probability, method="inverted_cdf")))
+            lower, upper = median - factor * (median - lower), median + factor * (upper - median)
+    band[:, known] = lower, median, upper
+    return band

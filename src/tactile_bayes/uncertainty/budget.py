@@ -10,9 +10,8 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.uncertainty.band import contours_drawn, length_unit
+from tactile_bayes.uncertainty.band import contours_drawn, length_unit, quantile_band
 from tactile_bayes.uncertainty.offsets import aligned, feet_of, most_central, normal_offsets
-from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import reach
 
 _DRAWS = 2000

@@ -14,9 +14,8 @@ from tactile_bayes.contours.base import Locus
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws, contour_events
-from tactile_bayes.uncertainty.band import contour_band, length_unit
+from tactile_bayes.uncertainty.band import central_levels, contour_band, length_unit
 from tactile_bayes.uncertainty.offsets import heights_of
-from tactile_bayes.uncertainty.quantiles import central_levels
 
 _GRID_POINTS = 101  # number of grid points of x across the gap
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.inference.result import refuse_no_contour
-from tactile_bayes.uncertainty.quantiles import central_levels
+from tactile_bayes.uncertainty.band import central_levels
 
 
 def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.uncertainty.band import central_levels
 from tactile_bayes.uncertainty.gap import gap, has_gap
-from tactile_bayes.uncertainty.quantiles import central_levels
 from tactile_bayes.uncertainty.rod_reach import events_of
 
 
