@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.diagnostics.predictive_check import predictive_check
@@ -231,7 +231,8 @@ def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dic
     for region, x in grid_points_of(simulation).items():
         height = np.asarray(simulation.contour.height(x))
         band, whole = (contour_band(tree, x, probability, simultaneous) for simultaneous in (False, True))
-        (inside, known), (all_inside, all_known) = (_inside(each, height) for each in (band, whole))
+        inside, all_inside = ((each.lower.values <= height) & (height <= each.upper.values) for each in (band, whole))
+        known, all_known = (np.isfinite(each.lower.values) for each in (band, whole))
         off = band["median"].values - height
         numbers |= {
             f"pointwise_{region}": float(inside[known].mean()) if known.any() else np.nan,
@@ -241,12 +242,6 @@ def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dic
             f"simultaneous_{region}": float(all_inside.all()) if all_known.all() else np.nan,
         }
     return numbers
-
-
-def _inside(band: xr.Dataset, height: Floats) -> tuple[Flags, Flags]:
-    """Return where a band contains heights, and where it is known."""
-    inside = (band.lower.values <= height) & (height <= band.upper.values)
-    return inside, np.isfinite(band.lower.values)
 
 
 def grid_points_of(simulation: Simulation) -> dict[str, Floats]:

@@ -92,7 +92,12 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     }
     if rod.rest_curvature != stated.rest_curvature:
         values |= dict.fromkeys(GROUPS["rest_shape"])
-    more = _differences(cell, stated_cell)
+    more = {
+        "drive_angle_offset": cell.drive_angle_offset - stated_cell.drive_angle_offset,
+        "backlash": cell.drive_angle_backlash - stated_cell.drive_angle_backlash,
+        **dict(zip(GROUPS["bias"], np.subtract(cell.bias, stated_cell.bias).tolist(), strict=True)),
+        **dict(zip(GROUPS["lever"], np.subtract(cell.lever, stated_cell.lever).tolist(), strict=True)),
+    }
     times = {**_ratios(cell, stated_cell), "rigidity_scale": rod.flexural_rigidity / stated.flexural_rigidity}
     found = {}
     for name in dict.fromkeys((*drawn, *assumed.priors)):
@@ -108,16 +113,6 @@ def _neutral(name: str) -> float | None:
         return 0.0
     parameter = parameter_named(name)
     return None if parameter is None or name == "discrepancy_length" else parameter.neutral
-
-
-def _differences(cell: LoadCell, stated: LoadCell) -> dict[str, float]:
-    """Return what a load cell has in addition to the stated one, by parameter."""
-    return {
-        "drive_angle_offset": cell.drive_angle_offset - stated.drive_angle_offset,
-        "backlash": cell.drive_angle_backlash - stated.drive_angle_backlash,
-        **dict(zip(GROUPS["bias"], np.subtract(cell.bias, stated.bias).tolist(), strict=True)),
-        **dict(zip(GROUPS["lever"], np.subtract(cell.lever, stated.lever).tolist(), strict=True)),
-    }
 
 
 def _ratios(cell: LoadCell, stated: LoadCell) -> dict[str, float]:

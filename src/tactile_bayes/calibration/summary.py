@@ -173,7 +173,8 @@ def _tested(rows: Sequence[Outcome], probability: float) -> tuple[xr.Dataset, fl
     """Return ranks, coverages and numbers of replicates, and the level of each test."""
     names = list(dict.fromkeys(name for row in rows for name in row.ranks))
     ranks = np.array([[row.ranks.get(name, -1) for name in names] for row in rows], dtype=int).reshape(len(rows), -1)
-    p_values = [_uniformity(of_name) for of_name in ranks.T]
+    known = [of_name[of_name >= 0] for of_name in ranks.T]
+    p_values = [uniformity_p_value(of_name, DRAWS) if of_name.size >= FEWEST else np.nan for of_name in known]
     columns = list(dict.fromkeys(name for row in rows for name in row.numbers))
     values = {name: np.array([row.numbers.get(name, np.nan) for row in rows]) for name in columns}
     found = [name for name in CLAIMS if name in values]
@@ -185,7 +186,11 @@ def _tested(rows: Sequence[Outcome], probability: float) -> tuple[xr.Dataset, fl
     # The false-alarm rate is shared by all tests.
     tested = int(np.isfinite(p_values).sum()) + sum(s.size >= FEWEST for s in shares)
     level = FALSE_ALARM / max(tested, 1)
-    noticed = [_noticed_coverage(s, probability, level) for s in shares]
+    none = np.nan, np.nan
+    noticed = [
+        noticed_coverage(s.size, probability, level, POWER, is_whole=_is_whole(s)) if s.size >= FEWEST else none
+        for s in shares
+    ]
     data = xr.Dataset(
         {
             "ranks": (("replicate", "quantity"), ranks, {"long_name": f"rank of the truth among {DRAWS} draws"}),
@@ -204,12 +209,6 @@ def _tested(rows: Sequence[Outcome], probability: float) -> tuple[xr.Dataset, fl
     return data, level
 
 
-def _noticed_coverage(shares: Floats, probability: float, level: float) -> tuple[float, float]:
-    if shares.size < FEWEST:
-        return np.nan, np.nan
-    return noticed_coverage(shares.size, probability, level, POWER, is_whole=_is_whole(shares))
-
-
 def _known(values: Floats) -> Floats:
     return values[np.isfinite(values)]
 
@@ -217,11 +216,6 @@ def _known(values: Floats) -> Floats:
 def _is_whole(shares: Floats) -> bool:
     """Return True if a claim held or failed as a whole in each replicate."""
     return bool(np.isin(shares, (0.0, 1.0)).all())
-
-
-def _uniformity(ranks: Index) -> float:
-    known = ranks[ranks >= 0]
-    return uniformity_p_value(known, DRAWS) if known.size >= FEWEST else np.nan
 
 
 def _faults(data: xr.Dataset, probability: float, level: float) -> list[tuple[float, str]]:

@@ -38,6 +38,12 @@ class Residuals(NamedTuple):
     loaded: Flags  # true for samples that the posterior expects to carry a load, shape (samples,)
     sweeps: tuple[Index, ...]  # rows of each sweep, in the order of measurement
 
+    @property
+    def stretches(self) -> list[Index]:
+        """Rows of the loaded part of each sweep in which there are enough to judge."""
+        parts = [rows[self.loaded[rows]] for rows in self.sweeps]
+        return [rows for rows in parts if rows.size >= _FEWEST_SAMPLES]
+
 
 def predictive_check(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dataset:
     """Check a record against those that the posterior predicts: see `tactile_bayes.check`."""
@@ -135,9 +141,7 @@ def _discrepancies(residuals: Residuals) -> Floats:
     enough, unloaded_enough = (np.count_nonzero(kind) >= _FEWEST_SAMPLES for kind in (loaded, ~loaded))
     if enough:
         energy = squares[:, loaded].mean(axis=1)
-        parts = [rows[loaded[rows]] for rows in residuals.sweeps]
-        parts = [rows for rows in parts if rows.size >= _FEWEST_SAMPLES]
-        if parts:
+        if parts := residuals.stretches:
             steps = np.concatenate([np.diff(cut_off[:, rows], axis=1) for rows in parts], axis=1)
             means = np.concatenate([_running_mean(cut_off[:, rows]) for rows in parts], axis=1)
             rough = (steps**2).mean(axis=1)
@@ -204,8 +208,7 @@ def _scores(discrepancies: Floats) -> Floats:
 
 def _worst_stretch(residuals: Residuals) -> Index:
     """Return the stretch of loaded samples of the real record whose mean residual is furthest from zero."""
-    parts = [rows[residuals.loaded[rows]] for rows in residuals.sweeps]
-    parts = [rows for rows in parts if rows.size >= _FEWEST_SAMPLES] or list(residuals.sweeps)
+    parts = residuals.stretches or list(residuals.sweeps)
     real = np.clip(residuals.values[:1], -_OUTLYING, _OUTLYING)
     best, found = -1.0, parts[0]
     for rows in parts:

@@ -131,7 +131,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
                 precision = precision + record_information(model, point, slopes=slopes).matrix
         deviations = deviation_of_heights(height_slopes(model, point, question.x), precision)
         rows[k, 0] = wide * mean_of_known(deviations)
-        rows[k, 1] = 0.5 * (_logdet(precision) - _logdet(own.precision))
+        rows[k, 1] = 0.5 * (np.linalg.slogdet(precision)[1] - np.linalg.slogdet(own.precision)[1])
         if question.nested and usable[k]:
             rows[k, 2:] = _nested(question, own, model, point, precision, rng)
     width, information, nested_width, nested_information, _ = map(_mean, rows.T)
@@ -237,7 +237,3 @@ def _mean(values: Floats) -> tuple[float, float]:
     values = values[~np.isnan(values)]
     error = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else np.nan
     return mean_of_known(values), error
-
-
-def _logdet(precision: Floats) -> float:
-    return float(np.linalg.slogdet(precision)[1])

@@ -313,14 +313,14 @@ def _axes(over: Mapping[str, Sequence[float]] | None) -> list[list[float]]:
     check_mapping("over", given, 'give lists of numbers by axis, like {"distance": [0.3, 0.5]}')
     if other := [name for name in given if name not in _AXES]:
         raise refused("over", other[0], f"the axes are {' and '.join(_AXES)}")
-    return [_grid(name, given.get(name, usual)) for name, usual in _AXES.items()]
-
-
-def _grid(name: str, values: Sequence[float]) -> list[float]:
-    numbers = check_numbers(name, values, "give a list of positive numbers", shape=(None,), least=TINY).tolist()
-    if len(set(numbers)) < len(numbers):
-        raise refused(name, values, "one of them is given twice")
-    return numbers
+    found = []
+    for name, usual in _AXES.items():
+        values = given.get(name, usual)
+        numbers = check_numbers(name, values, "give a list of positive numbers", shape=(None,), least=TINY).tolist()
+        if len(set(numbers)) < len(numbers):
+            raise refused(name, values, "one of them is given twice")
+        found.append(numbers)
+    return found
 
 
 def _objects(contours: Mapping[str, Contour] | Sequence[str], rod: Rod) -> dict[str, Contour]:

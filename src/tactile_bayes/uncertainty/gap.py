@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours import Contour
 from tactile_bayes.contours.base import Locus
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
@@ -170,7 +169,10 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     known = end > begin
     x = np.linspace(begin, end, _GRID_POINTS)
     trees = {"band": posterior} | ({} if without_events is None else {"band_without_events": without_events})
-    across = _triangles(contours, certificate, x, levels) | _bands(trees, x, probability)
+    heights = heights_of(contours, x)  # beyond its own gap a contour is known by contact
+    lower, upper = (np.where(np.isnan(edge), heights, edge) for edge in certificate.between(x))
+    between = np.quantile(lower, levels[0], axis=0), np.quantile(upper, levels[2], axis=0)
+    across = dict(zip(("triangle_lower", "triangle_upper"), between, strict=True)) | _bands(trees, x, probability)
     for name, values in across.items():
         variables[name] = (("x",) if values.ndim else (), values + (0.0 if known else np.nan), length)
     cut_short = any(np.isnan(across[name.replace("band", "band_width")]) for name in trees)
@@ -194,16 +196,6 @@ def _refuse_no_gap(events: xr.Dataset) -> None:
         )
     missing = [name for name in ("forward", "backward") if name not in events.segment.values]
     raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
-
-
-def _triangles(contours: Contour, certificate: Triangle, x: Floats, levels: tuple[float, ...]) -> dict[str, Floats]:
-    """Return the curves at x between which the triangles lie; beyond its own gap a contour is known by contact."""
-    heights = heights_of(contours, x)
-    lower, upper = (np.where(np.isnan(edge), heights, edge) for edge in certificate.between(x))
-    return {
-        "triangle_lower": np.quantile(lower, levels[0], axis=0),
-        "triangle_upper": np.quantile(upper, levels[2], axis=0),
-    }
 
 
 def _bands(trees: Mapping[str, xr.DataTree], x: Floats, probability: float) -> dict[str, Floats]:
@@ -246,14 +238,12 @@ def _rows(values: xr.DataArray) -> Floats:
 
 
 def _status(share_open: float, known: bool, cut_short: bool, untouched: bool) -> str:
-    if share_open == 0.0:
-        return "the sweeps overlap: no gap is left"
-    if not known:
-        return "the sweeps overlap in most contours: the triangle is that of the others, and there is no band"
-    if cut_short:
-        return "some contours end inside the gap: there is no width of their band"
-    if share_open < 1.0:
-        return "the sweeps overlap in some contours: the triangle is that of the others"
-    if untouched:
-        return "some contours are not touched in every sweep: this is of the others"
-    return "ok"
+    others = "the triangle is that of the others"
+    reasons = (
+        (share_open == 0.0, "the sweeps overlap: no gap is left"),
+        (not known, f"the sweeps overlap in most contours: {others}, and there is no band"),
+        (cut_short, "some contours end inside the gap: there is no width of their band"),
+        (share_open < 1.0, f"the sweeps overlap in some contours: {others}"),
+        (untouched, "some contours are not touched in every sweep: this is of the others"),
+    )
+    return next((reason for is_so, reason in reasons if is_so), "ok")

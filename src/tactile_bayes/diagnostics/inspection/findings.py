@@ -97,21 +97,19 @@ def _of_channels(samples: xr.Dataset, flags: str) -> Iterator[tuple[Flags, dict[
             yield flagged, words | {"are": "is" if np.sum(flagged) == 1 else "are"}
 
 
-def _cut_off(record: xr.Dataset, samples: xr.Dataset, stated: LoadCell | None) -> list[Finding]:
-    found = []
+def _cut_off(record: xr.Dataset, samples: xr.Dataset, stated: LoadCell | None) -> Iterator[Finding]:
     for flagged, words in _of_channels(samples, "cut_off"):
         column = record[words["channel"]]
         largest = quantity(float(np.abs(column.values[flagged]).max()), str(column.attrs.get("units", "1")))
         is_known = stated is not None and np.isfinite(stated.limit[CHANNELS.index(words["channel"])])
         advice = "" if is_known else ": state its end in the header, or take a cell with a larger one"
-        found.append(Finding("cut off", largest=largest, advice=advice, **words))
-    return found
+        yield Finding("cut off", largest=largest, advice=advice, **words)
 
 
-def _without_contact(sweeps: xr.Dataset) -> list[Finding]:
+def _without_contact(sweeps: xr.Dataset) -> Iterator[Finding]:
     none = sweeps.sweep.values[~(sweeps.contact.values | _is_short(sweeps))].tolist()
-    some = 0 < len(none) < sweeps.sizes["sweep"]
-    return [Finding("sweep without contact", sweeps=of_sweeps(none, "show"))] if some else []
+    if 0 < len(none) < sweeps.sizes["sweep"]:
+        yield Finding("sweep without contact", sweeps=of_sweeps(none, "show"))
 
 
 def _is_short(sweeps: xr.Dataset) -> Flags:
@@ -119,12 +117,10 @@ def _is_short(sweeps: xr.Dataset) -> Flags:
     return np.asarray(sweeps.samples.values < _FEWEST_IN_CONTACT)
 
 
-def _stored_twice(samples: xr.Dataset) -> list[Finding]:
-    flags = samples.repeated.values
-    if not flags.any():
-        return []
-    have = "has" if np.sum(flags) == 1 else "have"
-    return [Finding("stored twice", count=counted(flags, "sample"), have=have, samples=listed(flags))]
+def _stored_twice(samples: xr.Dataset) -> Iterator[Finding]:
+    if (flags := samples.repeated.values).any():
+        have = "has" if np.sum(flags) == 1 else "have"
+        yield Finding("stored twice", count=counted(flags, "sample"), have=have, samples=listed(flags))
 
 
 def _outlying(samples: xr.Dataset, stated: LoadCell | None) -> list[Finding]:
@@ -137,18 +133,17 @@ def _outlying(samples: xr.Dataset, stated: LoadCell | None) -> list[Finding]:
     return [Finding("outlier", advice=advice, **forms[words["are"]], **words) for words in every]
 
 
-def _zeros(record: xr.Dataset, channels: xr.Dataset, stated: LoadCell | None, false_alarm: float) -> list[Finding]:
-    found = []
+def _zeros(record: xr.Dataset, channels: xr.Dataset, stated: LoadCell | None, false_alarm: float) -> Iterator[Finding]:
     if not _drifts(stated):
         p_values = dict(zip(channels.channel.values.tolist(), channels.same_bias_p_value.values.tolist(), strict=True))
-        found += moved_zero(p_values, false_alarm)
+        yield from moved_zero(p_values, false_alarm)
     far = far_off(record, channels, stated)
     if far:
         entries = {name: column_entry(record[name], added=-float(channels.bias.sel(channel=name))) for name in far}
         how = f"as the column is read: {rig_entries(entries)}" if all(entries.values()) else "from the readings"
-        found.append(Finding("far zero", zeros=joined(list(far.values())), how=how))
+        yield Finding("far zero", zeros=joined(list(far.values())), how=how)
     if stated is None or _drifts(stated):
-        return found
+        return
     off = {}
     for row in _rows(channels):
         name = str(row.channel.values)
@@ -156,7 +151,7 @@ def _zeros(record: xr.Dataset, channels: xr.Dataset, stated: LoadCell | None, fa
             error = float(np.hypot(float(row.bias_uncertainty), stated.bias_uncertainty[CHANNELS.index(name)]))
             off[name] = float(row.bias - row.stated_bias), error, str(row.unit.values)
     advice = "infer finds it as it is (bias, one of the defaults), unless the rig says that it is known."
-    return [*found, *zero_off(off, advice)]
+    yield from zero_off(off, advice)
 
 
 def far_off(record: xr.Dataset, channels: xr.Dataset, stated: LoadCell | None) -> dict[str, str]:
@@ -205,12 +200,10 @@ def _drifts(stated: LoadCell | None) -> bool:
     return stated is not None and stated.drift is not None
 
 
-def _steps(samples: xr.Dataset) -> list[Finding]:
-    flags = samples.uneven_step.values
-    if not flags.any():
-        return []
-    differ = "differs" if np.sum(flags) == 1 else "differ"
-    return [Finding("uneven steps", steps=counted(flags, "step"), differ=differ, samples=listed(flags))]
+def _steps(samples: xr.Dataset) -> Iterator[Finding]:
+    if (flags := samples.uneven_step.values).any():
+        differ = "differs" if np.sum(flags) == 1 else "differ"
+        yield Finding("uneven steps", steps=counted(flags, "step"), differ=differ, samples=listed(flags))
 
 
 def _unfinished(sweeps: xr.Dataset) -> list[Finding]:

@@ -141,7 +141,10 @@ def fit_of(found: Corrected, *, most: float, progress: Callable[[int, int], obje
     alone = _of_any_samples(cell, record.sizes["sample"])
 
     def share_if(correction: Correction) -> float:
-        read = _read_by(alone, correction.apply(loads))
+        changed = correction.apply(loads)
+        # As a noise-free cell would read them, so that the cell's noise is in proportion to the loads.
+        columns = zip(CHANNELS, alone.expected(loads_of(changed)).T, strict=True)
+        read = changed.assign({name: changed[name].copy(data=values) for name, values in columns})
         otherwise = found._replace(record=read, load_cell=alone, friction=correction.friction)
         return sum(_shares(contacts_of(otherwise, "constrained"))[:2])
 
@@ -179,9 +182,3 @@ def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
         drive_angle_backlash=0.0,
         frame=None,
     )
-
-
-def _read_by(cell: LoadCell, loads: xr.Dataset) -> xr.Dataset:
-    """Return the loads as a noise-free cell would read them, so that the cell's noise is in proportion to them."""
-    read = cell.expected(loads_of(loads))
-    return loads.assign({name: loads[name].copy(data=read[:, index]) for index, name in enumerate(CHANNELS)})

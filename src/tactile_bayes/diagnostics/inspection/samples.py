@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -24,13 +23,6 @@ _WHOLE = 1e-6  # tolerated distance of a reading, in units of its last digit, fr
 _USUAL = 0.2  # largest share of uneven steps: with more of them, the drive is meant to move so
 
 
-class Autocorrelation(NamedTuple):
-    """Lag-one autocorrelation of unloaded residuals."""
-
-    value: float  # coefficient, corrected for the bias from subtracting means; NaN if there are too few samples
-    score: float  # coefficient in standard errors, about standard normal for white noise
-
-
 def unloaded_stretches(sweeps: list[Index], unloaded: Flags) -> list[Index]:
     """Return the rows of every stretch of consecutive unloaded samples; `unloaded` has shape (samples,)."""
     stretches = []
@@ -48,22 +40,25 @@ def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
     return together, robust_deviation(together)
 
 
-def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
-    """Return the autocorrelation of readings, shape (samples,), in all stretches; NaN if most readings are equal."""
+def autocorrelation(reading: Floats, stretches: list[Index]) -> tuple[float, float]:
+    """Return the lag-one autocorrelation of unloaded readings, shape (samples,), and the same in standard errors.
+
+    It is corrected for the bias from subtracting means; NaN if most readings are equal, or they are too few.
+    """
     _, spread = centred(reading, stretches)
     if spread == 0.0:
-        return Autocorrelation(np.nan, np.nan)
+        return np.nan, np.nan
     cut = [reading[rows] - np.median(reading[rows]) for rows in stretches if rows.size > 2]
     cut = [np.clip(residual, -_CUT * spread, _CUT * spread) for residual in cut]
     residuals = [residual - residual.mean() for residual in cut]
     pairs, square = sum(r.size - 1 for r in residuals), float(sum(r @ r for r in residuals))
     if pairs < 10 or square <= 0.0:
-        return Autocorrelation(np.nan, np.nan)
+        return np.nan, np.nan
     product = float(sum(r[1:] @ r[:-1] for r in residuals))
     expected = -sum((r.size - 1) / r.size for r in residuals)
     variance = square / pairs  # a stretch of n has n − 1 degrees of freedom, as many as pairs
     value = (product / variance - expected) / pairs
-    return Autocorrelation(float(np.clip(value, -1.0, 1.0)), float(value * np.sqrt(pairs)))
+    return float(np.clip(value, -1.0, 1.0)), float(value * np.sqrt(pairs))
 
 
 def position_scatter(reading: Floats, stretches: list[Index], positions: list[Index]) -> tuple[float, float, float]:
