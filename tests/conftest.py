@@ -11,12 +11,11 @@ import pytest
 import typer.testing
 from hypothesis import settings
 
+import tactile_bayes as tb
 from helpers.contour_posteriors import QUICK
 from helpers.forward_models import compile_share
 from helpers.report_pages import quickly, undrawn
-from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.sweep import scan
 
 os.environ["MPLBACKEND"] = "Agg"  # figures need no screen
 
@@ -78,7 +77,7 @@ def commands_built_once():
 @pytest.fixture(scope="session")
 def measured():
     """The demonstration's record, in coarse steps: SI, both directions, all channels."""
-    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.05).record, rng=1)
+    record = LOAD_CELL.measure(tb.scan(CONTOUR, rig=tb.Rig(rod=ROD), drive_step=0.05).record, rng=1)
     return record.drop_vars([name for name in record.data_vars if name.startswith("truth_")])
 
 
@@ -88,7 +87,7 @@ def analysed(measured, tmp_path_factory):
     from tactile_bayes.runs.contour import analyse
 
     folder = tmp_path_factory.mktemp("analysed") / "made" / "on the way"
-    return analyse(measured, folder, rig=Rig(unknown="nothing"), settings=QUICK, truth=CONTOUR, rng=1), folder
+    return analyse(measured, folder, rig=tb.Rig(unknown="nothing"), settings=QUICK, truth=CONTOUR, rng=1), folder
 
 
 @pytest.fixture(name="undrawn")

@@ -3,20 +3,19 @@
 import numpy as np
 import pytest
 
+import tactile_bayes as tb
 from helpers import commands
 from helpers.refusals import refused
 from tactile_bayes.contours import Ellipse, Parabola
 from tactile_bayes.errors import ReachError, RecordError
-from tactile_bayes.record import present_channels, write_record
-from tactile_bayes.rig import Rig, read_record
-from tactile_bayes.sweep import scan
+from tactile_bayes.record import present_channels
 
 
 @pytest.fixture(scope="module")
 def good(measured, tmp_path_factory):
     """Header of a good file, and its columns by name, as lists of cells."""
     path = tmp_path_factory.mktemp("good") / "record.csv"
-    write_record(measured, path)
+    tb.write_record(measured, path)
     lines = path.read_text(encoding="utf-8").splitlines()
     header = [line for line in lines if line.startswith("#") and "column" not in line]
     names, *rows = [line.split(",") for line in lines if not line.startswith("#")]
@@ -65,7 +64,7 @@ def test_a_mistake_in_a_file_is_named_with_its_place(good, tmp_path, mistake, na
     header, columns = good
     path = written(tmp_path, header, mistake(columns))
     with refused(RecordError, *named) as caught:
-        read_record(path)
+        tb.read_record(path)
     assert str(caught.value).startswith(f"{path}: ")
     result = commands.call("infer", path, "--out", tmp_path / "run")
     assert (result.exit_code, result.stdout) == (2, "")
@@ -79,14 +78,14 @@ def test_a_mistake_in_a_file_is_named_with_its_place(good, tmp_path, mistake, na
 def test_a_channel_wholly_missing_is_allowed(good, tmp_path, change, missing):
     header, columns = good
     path = written(tmp_path, header, change(columns))
-    assert present_channels(read_record(path, Rig(file={"missing": missing}))) == ("holding_moment", "force_x")
+    assert present_channels(tb.read_record(path, tb.Rig(file={"missing": missing}))) == ("holding_moment", "force_x")
     (tmp_path / "rig.toml").write_text(f'unknown = "nothing"\n[file]\nmissing = {missing}\n')
     result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--rig", tmp_path / "rig.toml")
     assert result.exit_code == 0, result.output
     assert "No contact points" in result.stdout
 
 
-RUBBED = Rig(unknown={"friction": 0.3})
+RUBBED = tb.Rig(unknown={"friction": 0.3})
 
 
 @pytest.mark.parametrize(
@@ -99,4 +98,4 @@ RUBBED = Rig(unknown={"friction": 0.3})
 )
 def test_a_contour_that_is_hardly_touched_is_refused(contour, options, named):
     with refused(ReachError, named):
-        scan(contour, **options)
+        tb.scan(contour, **options)

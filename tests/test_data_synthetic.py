@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from tactile_bayes.rig import read_record
 from tactile_bayes.runs.demonstration import measure_demo
 
 FOLDER = Path(__file__).parents[1] / "data" / "synthetic"
@@ -16,7 +15,7 @@ LENGTH, RIGIDITIES, DISTANCES = 0.1, (0.0005, 0.0002, 0.0001), (0.3, 0.5, 0.7)
 
 
 def test_the_demonstration_is_reproduced(tmp_path):
-    stored, made = read_record(FOLDER / "demonstration.csv"), read_record(measure_demo(tmp_path, rng=1)[0])
+    stored, made = tb.read_record(FOLDER / "demonstration.csv"), tb.read_record(measure_demo(tmp_path, rng=1)[0])
     assert stored.attrs == made.attrs
     assert list(stored.data_vars) == list(made.data_vars)
     for name, column in stored.items():

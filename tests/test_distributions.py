@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import tactile_bayes as tb
 from tactile_bayes.distributions import (
     KINDS,
     check_distribution,
@@ -15,10 +16,8 @@ from tactile_bayes.distributions import (
     table_of_distribution,
 )
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.parameters.priors import widened
 from tactile_bayes.inference.point_load import infer_point_load
-from tactile_bayes.rig import Rig
 
 NAN = float("nan")
 
@@ -72,9 +71,9 @@ POINTS = np.repeat([10.0, 20.0, 30.0], 4), np.repeat([1.0, 2.0, 3.0], 4), np.ara
     ("call", "words"),
     [
         *((partial(check_distribution, "q", prior), f"prior of q.*{words}") for prior, words in WITHOUT_DENSITY),
-        (partial(Rig, unknown={"friction": NO_WIDTH}), "no width"),
-        (partial(Rig, unknown={"bias": NO_WIDTH}), "no width"),
-        (partial(Family, "parabola", q=NO_WIDTH), "no width"),
+        (partial(tb.Rig, unknown={"friction": NO_WIDTH}), "no width"),
+        (partial(tb.Rig, unknown={"bias": NO_WIDTH}), "no width"),
+        (partial(tb.Family, "parabola", q=NO_WIDTH), "no width"),
         (partial(infer_point_load, *POINTS, priors={"clamp_angle": stats.norm(0.0, 0.0)}, rng=1), "no width"),
         *((partial(distribution_of_table, table, "friction"), "friction") for table in STATING_NOTHING),
         *((partial(table_of_distribution, given), "cannot be written") for given in (Flat(0.5, 0.0), HISTOGRAM)),

@@ -12,18 +12,15 @@ from scipy import stats
 
 from helpers.refusals import refused
 from helpers.tasks import StrangeError
-from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate, experiment_of
+from tactile_bayes import Family, LoadCell, Motion, Rig, Rod, Rotation, SamplerSettings, Translation, calibrate
+from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
 from tactile_bayes.calibration.replicate import REPLICATES, Outcome
 from tactile_bayes.calibration.simulated_experiment import Misspecification
 from tactile_bayes.errors import CalibrationError, ParameterError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.ensembles import SamplerSettings, moves
-from tactile_bayes.inference.family import Family
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.inference.ensembles import moves
 from tactile_bayes.numerics.random_numbers import child
-from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.sweep import Motion, Rotation, Translation
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.tasks import Workers
 
 module = importlib.import_module("tactile_bayes.calibration.calibrate")

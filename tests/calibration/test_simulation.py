@@ -15,24 +15,21 @@ from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import loads_of
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 
-QUIET = LoadCell(force_noise=1e-12, moment_noise=1e-12)
+QUIET = tb.LoadCell(force_noise=1e-12, moment_noise=1e-12)
 ANGLES = np.radians(np.arange(-30.0, 211.0, 5.0))
 DRIVE = tb.Rotation(drive_angles=ANGLES)
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
-FAMILY = Family("parabola", **PRIORS)
-SI = Rod(length=0.1, flexural_rigidity=1e-5)
+FAMILY = tb.Family("parabola", **PRIORS)
+SI = tb.Rod(length=0.1, flexural_rigidity=1e-5)
 
 
 def experiment(family=FAMILY, *, unknown="nothing", load_cell=QUIET, rod=None, drive=DRIVE, truth=None):
-    return experiment_of(family, Rig(rod=rod, load_cell=load_cell, unknown=unknown), rng=1, drive=drive, truth=truth)
+    return experiment_of(family, tb.Rig(rod=rod, load_cell=load_cell, unknown=unknown), rng=1, drive=drive, truth=truth)
 
 
 def simulated(seed=0, **options):
@@ -46,7 +43,7 @@ def among(*names):
 
 def real(load_cell=None, **known):
     """A rig that is as stated, but for this."""
-    return Rig(load_cell=load_cell, unknown={**NOTHING, **known})
+    return tb.Rig(load_cell=load_cell, unknown={**NOTHING, **known})
 
 
 def same_loads(made, scan):
@@ -60,7 +57,7 @@ def contour_of(made, left=0.0, up=0.0):
 
 def scanned(made, *, friction=0.0, **options):
     """A scan of the same contour, at the angles at which the rod was."""
-    rig = Rig(unknown={"friction": friction})
+    rig = tb.Rig(unknown={"friction": friction})
     return tb.scan(contour_of(made), rig, drive_angles=ANGLES, **options)
 
 
@@ -69,7 +66,7 @@ def agree(made, scan, *, rigidity=1.0, zeros=0.0):
 
     The truths are such that the rod feels some ten of these; where it is pressed harder less can be asked.
     """
-    rod = SI if made.measured.attrs["units"] == "SI" else Rod()
+    rod = SI if made.measured.attrs["units"] == "SI" else tb.Rod()
     unit = rod.load_units
     expected = rigidity * loads_of(scan.record) + zeros
     np.testing.assert_allclose(loads_of(made.measured) / unit, expected / unit, atol=1e-8, rtol=0.0)
@@ -85,25 +82,6 @@ def test_what_is_measured_is_what_a_scan_feels(direction):
     np.testing.assert_array_equal(made.measured.drive_angle, scan.record.drive_angle)
     agree(made, scan)
     assert set(made.truth) == {"a", "q", "x_c", "noise_scale"}
-
-
-@pytest.mark.parametrize("told", [0.0, 0.5])
-def test_a_lever_and_a_backlash_of_the_cell_that_measures(told):
-    """The readings are the same, whatever is told of them; what the encoder reads is known where it is told."""
-    true, known = (
-        replace(QUIET, lever=(0.03 * share, -0.02 * share), drive_angle_backlash=0.02 * share) for share in (1.0, told)
-    )
-    made = simulated(load_cell=known, truth=real(true))
-    way = np.where(made.measured.direction == "forward", 0.5, -0.5)
-    np.testing.assert_allclose(made.measured.drive_angle - 0.02 * told * way, np.r_[ANGLES, ANGLES[::-1]], atol=1e-12)
-    backlash = 0.01 * (1.0 - told)  # half of what is not known of it
-    sweeps = [
-        tb.scan(contour_of(made), direction=direction, drive_angles=ANGLES - sense * backlash).record
-        for direction, sense in (("forward", 1.0), ("backward", -1.0))
-    ]
-    loads = np.concatenate([loads_of(sweep) for sweep in sweeps])
-    loads[:, 0] += -0.02 * loads[:, 1] - 0.03 * loads[:, 2]
-    np.testing.assert_allclose(loads_of(made.measured), loads, atol=1e-7)
 
 
 def test_the_truth_has_what_is_known_of_it():
@@ -124,18 +102,18 @@ def test_the_truth_has_what_is_known_of_it():
 def test_the_modes_of_a_trace_have_no_true_value_if_the_rod_is_not_what_it_says():
     s = np.linspace(0.0, 1.0, 25)
     shaken = 1e-3 * np.random.default_rng(1).normal(size=(2, s.size))
-    traced = Rod.from_shape(s + shaken[0], shaken[1])
+    traced = tb.Rod.from_shape(s + shaken[0], shaken[1])
     of_trace = set(GROUPS["rest_shape"])
     unknown = {**NOTHING, "rest_shape": "default"}
-    made = simulated(rod=traced, unknown=unknown, truth=replace(real(), rod=Rod()))
+    made = simulated(rod=traced, unknown=unknown, truth=replace(real(), rod=tb.Rod()))
     assert not of_trace & set(made.truth)
     assert of_trace & set(simulated(rod=traced, unknown=unknown).truth)
 
 
 def test_a_truth_of_which_nothing_is_said_is_a_real_rig():
     """All that is unknown of one is drawn; the load cell is that which inference assumes."""
-    asked = experiment(truth=Rig())
-    assert asked.simulated.unknowns.names == Experiment(asked.assumed.record, Rig(load_cell=QUIET)).unknowns.names
+    asked = experiment(truth=tb.Rig())
+    assert asked.simulated.unknowns.names == Experiment(asked.assumed.record, tb.Rig(load_cell=QUIET)).unknowns.names
     made = simulate(asked, np.random.default_rng(1))
     assert asked.problem_of(made.measured).model.names == ("a", "q", "x_c", "noise_scale")
     assert abs(made.truth["lever_x"]) > 1e-6
@@ -159,27 +137,19 @@ def test_pivots_are_shifted():
 
 def test_what_is_drawn_of_an_si_rod():
     """Rigidity, the encoder's offset and biases; the angles read are those of the truth and the offset."""
-    cell = LoadCell(force_noise=1e-12 * SI.force_unit, moment_noise=1e-12 * SI.moment_unit)
-    family = Family("parabola", a=stats.uniform(4.0, 4.0), q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01))
+    cell = tb.LoadCell(force_noise=1e-12 * SI.force_unit, moment_noise=1e-12 * SI.moment_unit)
+    family = tb.Family("parabola", a=stats.uniform(4.0, 4.0), q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01))
     unknown = among("rigidity_scale", "drive_angle_offset", "bias", "drift")
     truth = Misspecification(base_shift=(0.003, 0.0))
     made = simulated(family=family, rod=SI, load_cell=cell, unknown=unknown, truth=truth)
     offset = made.truth["drive_angle_offset"]
     way = np.linspace(-0.5, 0.5, made.measured.sizes["sample"])[:, None]
-    scan = tb.scan(contour_of(made, left=0.003), drive_angles=ANGLES - offset, rig=Rig(rod=SI))
+    scan = tb.scan(contour_of(made, left=0.003), drive_angles=ANGLES - offset, rig=tb.Rig(rod=SI))
     bias, drift = (np.array([made.truth[name] for name in GROUPS[group]]) for group in ("bias", "drift"))
     zeros = bias + drift * way
     agree(made, scan, rigidity=made.truth["rigidity_scale"], zeros=zeros)
     np.testing.assert_allclose(made.measured.drive_angle, scan.record.drive_angle + offset, atol=1e-12)
     assert made.measured.attrs["units"] == "SI"
-
-
-def test_forces_in_the_frame_of_a_cell_that_turns():
-    made = simulated(load_cell=replace(QUIET, frame="turning"))
-    _, x, y = loads_of(scanned(made).record).T
-    turned = np.exp(-1j * made.measured.drive_angle.values) * (x + 1j * y)
-    np.testing.assert_allclose(made.measured.force_x, turned.real, atol=1e-8)
-    np.testing.assert_allclose(made.measured.force_y, turned.imag, atol=1e-8)
 
 
 def test_a_flat_spot_is_felt():
@@ -217,8 +187,8 @@ def noise_of(made):
 def test_noise_is_what_the_load_cell_that_measures_makes():
     """Of the same random numbers twice the noise is twice the noise; the scale that is inferred is on top of both."""
     told = noise_of(simulated(load_cell=CELL))
-    other = LoadCell(force_noise=0.1, moment_noise=0.04)
-    made = simulated(load_cell=CELL, truth=Rig(load_cell=other, unknown="nothing"))
+    other = tb.LoadCell(force_noise=0.1, moment_noise=0.04)
+    made = simulated(load_cell=CELL, truth=tb.Rig(load_cell=other, unknown="nothing"))
     np.testing.assert_allclose(noise_of(made), 2.0 * told, atol=1e-8)
     assert made.truth["noise_scale"] == pytest.approx(2.0 * simulated(load_cell=CELL).truth["noise_scale"])
     fixed = simulated(load_cell=CELL, truth=real(noise_scale=3.0))
@@ -244,7 +214,7 @@ def test_the_encoder_of_a_cell_that_is_told():
 
 
 def test_truths_come_from_the_other_family_and_inference_takes_its_own():
-    other = Family("parabola", a=0.7, q=stats.uniform(0.45, 0.01))
+    other = tb.Family("parabola", a=0.7, q=stats.uniform(0.45, 0.01))
     asked = experiment(truth=Misspecification(family=other))
     made = simulate(asked, np.random.default_rng(1))
     assert made.truth["a"] == 0.7
@@ -266,11 +236,11 @@ def test_a_rig_out_of_reach_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("truth", "named"), [({"load_cell": LoadCell()}, ["truth", "no noise"]), ({"rod": SI}, ["dimensionless"])]
+    ("truth", "named"), [({"load_cell": tb.LoadCell()}, ["truth", "no noise"]), ({"rod": SI}, ["dimensionless"])]
 )
 def test_a_truth_that_does_not_fit_is_refused(truth, named):
     with refused(ParameterError, *named):
-        experiment(truth=Rig(**truth))
+        experiment(truth=tb.Rig(**truth))
 
 
 def test_the_true_value_of_what_is_inferred_is_that_of_the_simulated_rig():
@@ -278,17 +248,17 @@ def test_the_true_value_of_what_is_inferred_is_that_of_the_simulated_rig():
     encoder = {"drive_angle_backlash": 0.02, "drive_angle_offset": -0.01}
     gain = ((1.05, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     cell = replace(QUIET, **encoder, bias=(0.0, 2e-5, 0.0), lever=(1e-4, -2e-4), gain=gain, moment_curve=(30.0, 0.0))
-    rod = Rod(length=0.1005, flexural_rigidity=1.1e-5, rest_curvature=0.2, taper=0.01)
+    rod = tb.Rod(length=0.1005, flexural_rigidity=1.1e-5, rest_curvature=0.2, taper=0.01)
     known = {"friction": 0.3, "rigidity_scale": 1.2, "drive_angle_offset": 0.05, "taper": 0.02, "moment_bias": 1e-6}
     known |= {"force_y_bias": -2e-5, "force_x_drift": 1e-5, "base_2_x": 1e-3, "base_2_y": -2e-3}
     of_cell = ("drive_angle_offset", "backlash", "bias", "drift", "lever", "moment_gain", "moment_curve")
     names = ("friction", "rigidity_scale", *of_cell, "rest_curvature", "taper", "length", "base")
     a = stats.lognorm(s=0.4, scale=6.0)
-    family = Family("parabola", a=a, q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01))
-    truth = Rig(rod=rod, load_cell=cell, unknown={**NOTHING, **known})
+    family = tb.Family("parabola", a=a, q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01))
+    truth = tb.Rig(rod=rod, load_cell=cell, unknown={**NOTHING, **known})
     drive = [DRIVE, replace(DRIVE, base=(0.02, 0.0))]
     made = simulated(family=family, rod=SI, drive=drive, unknown=among(*names), truth=truth)
-    model = Experiment(made.measured, Rig(load_cell=QUIET, unknown=among(*names))).model
+    model = Experiment(made.measured, tb.Rig(load_cell=QUIET, unknown=among(*names))).model
     model.likelihood.exact = True
     assert set(model.names) <= set(made.truth)
     point = np.array([[made.truth[name] for name in model.names]])
@@ -304,6 +274,6 @@ def test_records_are_simulated_from_a_calibrated_rig():
     levers = {"lever_x": stats.norm(0.01, 1e-3), "lever_y": stats.norm(-0.01, 1e-3)}
     joint = RigPrior(levers, np.array([[1.0, 0.999], [0.999, 1.0]]), 0.0, "")
     unknown = {name: value for name, value in NOTHING.items() if name != "lever"}
-    made = simulated(unknown=among("lever"), truth=Rig(unknown=unknown, calibration=joint))
+    made = simulated(unknown=among("lever"), truth=tb.Rig(unknown=unknown, calibration=joint))
     scores = [(made.truth[name] - mean) / 1e-3 for name, mean in zip(levers, (0.01, -0.01), strict=True)]
     assert abs(scores[0] - scores[1]) < 0.3  # 6 standard deviations

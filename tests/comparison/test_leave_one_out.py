@@ -13,6 +13,7 @@ from arviz_stats.base.array import array_stats
 from scipy import stats
 from scipy.special import logsumexp
 
+import tactile_bayes as tb
 from helpers.contour_posteriors import swept
 from helpers.load_cells import CELL, SHARED, WALK, WANDER, moments
 from helpers.refusals import refused
@@ -21,10 +22,8 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.load_cell import LoadCell, RandomWalk
-from tactile_bayes.rig import Rig
+from tactile_bayes.load_cell import RandomWalk
 
 SIGMAS = 5.0
 
@@ -234,12 +233,12 @@ def test_too_few_draws_are_refused():
         left_out(np.zeros((4, 6, 2)))
 
 
-SETTINGS = SamplerSettings(ensembles=2, walkers=20, min_ess=250, max_r_hat=1.05)
+SETTINGS = tb.SamplerSettings(ensembles=2, walkers=20, min_ess=250, max_r_hat=1.05)
 
 
 def problem_of(cell=CELL):
     measured = cell.measure(swept(Parabola(0.5, 0.5), step=0.12), rng=4)
-    return contour_problem(Experiment(measured, Rig(load_cell=cell, unknown="nothing"), "parabola"))
+    return contour_problem(Experiment(measured, tb.Rig(load_cell=cell, unknown="nothing"), "parabola"))
 
 
 def inferred_without(problem, sample):
@@ -275,9 +274,9 @@ def test_samples_are_predicted_as_if_inferred_without_them():
 
 @pytest.mark.slow
 def test_of_a_cell_that_drifts_samples_at_events_are_left_out():
-    cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.002, moment=0.001))
+    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.002, moment=0.001))
     problem = problem_of(cell)
-    brief = SamplerSettings(ensembles=2, max_steps=40)
+    brief = tb.SamplerSettings(ensembles=2, max_steps=40)
     found = predicted_samples(problem, sampled(problem, seed=1, settings=brief), seed=2, settings=brief)
     events = np.zeros(problem.loaded.size, dtype=bool)
     events[problem.model.likelihood.segments.event_samples(problem.loaded)] = True

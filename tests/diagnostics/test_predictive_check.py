@@ -7,17 +7,14 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+import tactile_bayes as tb
 from helpers.predicted_records import CELL, ideal, predicted, taken_for_a_parabola, with_readings
 from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
 
 CELLS = {
     "white": CELL,
@@ -133,12 +130,12 @@ def test_a_parabola_is_told_from_what_is_none(profile, passes):
 def test_records_of_the_right_family_pass(name):
     """No alarm in 12 records of each cell: false alarm of the test 6 % if the p-values were not conservative."""
     contour = paper_profile("II", q=0.5)
-    converged = SamplerSettings(ensembles=2, walkers=24, max_steps=1500, min_ess=200, max_r_hat=1.05)
+    converged = tb.SamplerSettings(ensembles=2, walkers=24, max_steps=1500, min_ess=200, max_r_hat=1.05)
     p_values = []
     for seed in range(12):
-        measured = CELLS[name].measure(scan(contour, drive_step=np.radians(2.0)).record, rng=seed)
-        rig = Rig(load_cell=CELLS[name], unknown="nothing")
-        result = infer_contour(measured, rig=rig, rng=seed, settings=converged)
+        measured = CELLS[name].measure(tb.scan(contour, drive_step=np.radians(2.0)).record, rng=seed)
+        rig = tb.Rig(load_cell=CELLS[name], unknown="nothing")
+        result = tb.infer_contour(measured, rig=rig, rng=seed, settings=converged)
         assert result.attrs["converged"]
         p_values.append(float(predictive_check(result).overall_p_value))
     assert min(p_values) > 5e-3

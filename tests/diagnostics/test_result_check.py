@@ -7,24 +7,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import tactile_bayes as tb
 from helpers.contour_posteriors import QUICK, posterior
 from helpers.predicted_records import ideal, predicted, taken_for_a_parabola, with_readings
 from helpers.refusals import refused
-from tactile_bayes.assessment.trust import trust
 from tactile_bayes.contours import Parabola
 from tactile_bayes.diagnostics import reach_edge
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
-from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.result import to_arviz
-from tactile_bayes.load_cell import LoadCell, RandomWalk
+from tactile_bayes.load_cell import RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.sweep import Motion, Rotation, scan
-from tactile_bayes.uncertainty.band import contour_band, normal_band
+from tactile_bayes.rig import NOTHING
+from tactile_bayes.uncertainty.band import normal_band
 
 
 def changed(tree, group, **values):
@@ -44,7 +40,7 @@ def kinds(found):
 
 
 def test_of_a_good_result_all_is_well():
-    found = check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
+    found = tb.check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
     assert kinds(found) == ["all is well"]
     assert found.is_well
     message = found.messages[0]
@@ -55,7 +51,7 @@ def test_of_a_good_result_all_is_well():
 
 @pytest.mark.slow
 def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
-    found = check(taken_for_a_parabola("IV"))
+    found = tb.check(taken_for_a_parabola("IV"))
     assert kinds(found)[:3] == ["not described", "not converged", "misfit as noise"]
     values = found.messages[0].details
     assert values["like"] == "none"
@@ -66,7 +62,7 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
 
 def test_a_forgotten_tare_is_told_with_its_size():
     tree = predicted()
-    found = check(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
+    found = tb.check(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
     assert kinds(found)[:2] == ["zero off", "not described"]
     assert found.messages[0].details["off"].startswith("force_y is off by 0.3")
 
@@ -74,14 +70,14 @@ def test_a_forgotten_tare_is_told_with_its_size():
 def test_forces_in_another_unit_and_a_flipped_moment_come_first():
     tree = predicted()
     thousandfold = {name: 1e3 * readings(tree)[name] for name in ("force_x", "force_y")}
-    assert kinds(check(with_readings(tree, **thousandfold)))[:2] == ["large loads", "not described"]
-    assert kinds(check(with_readings(tree, holding_moment=-readings(tree)["holding_moment"])))[0] == "moment sign"
+    assert kinds(tb.check(with_readings(tree, **thousandfold)))[:2] == ["large loads", "not described"]
+    assert kinds(tb.check(with_readings(tree, holding_moment=-readings(tree)["holding_moment"])))[0] == "moment sign"
 
 
 def test_what_has_not_converged_is_said_even_where_there_is_nothing_to_compare_with():
     tree = predicted(chains=1, draws=20)
     tree.attrs |= {"converged": 0, "message": "not converged, the steps allowed ran out"}
-    assert kinds(check(tree)) == ["not converged"]
+    assert kinds(tb.check(tree)) == ["not converged"]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +90,7 @@ def test_noise_that_is_not_as_stated(factor, scatter, kind):
     for name in CHANNELS:
         predictive[name] = ideal(name) + factor * (predictive[name] - ideal(name))
     tree["posterior_predictive"] = xr.DataTree(predictive)
-    found = check(
+    found = tb.check(
         with_readings(tree, **{name: ideal(name) + scatter * (v - ideal(name)) for name, v in readings(tree).items()})
     )
     assert kinds(found) == [kind]
@@ -102,12 +98,12 @@ def test_noise_that_is_not_as_stated(factor, scatter, kind):
 
 
 def test_loads_that_contradict_one_another_unless_noise_does_it():
-    (first, *_) = check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0})).messages
+    (first, *_) = tb.check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0})).messages
     assert (first.kind, first.details) == ("contradiction", {"chance": "below 1e-99", "dragging": ""})
     sought = predicted()
     sought.attrs |= {"nuisances": '["friction"]'}
     for tree, words in ((predicted(), 'friction = "default" under [unknown]'), (sought, "more friction than")):
-        dragged = check(tree, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0})).messages[0]
+        dragged = tb.check(tree, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0})).messages[0]
         assert "too small by 20 standard errors" in dragged.details["dragging"]
         assert words in dragged.details["dragging"]
 
@@ -115,7 +111,7 @@ def test_loads_that_contradict_one_another_unless_noise_does_it():
 def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():
     rng = np.random.default_rng(5)
     tree = changed(predicted(), "posterior", friction=np.abs(rng.normal(0.0003, 0.0001, (4, 250))))
-    assert check(changed(tree, "prior", friction=np.abs(rng.normal(0.0, 0.3, (1, 1000))))).is_well
+    assert tb.check(changed(tree, "prior", friction=np.abs(rng.normal(0.0, 0.3, (1, 1000))))).is_well
 
 
 def test_what_the_prior_forbids_and_what_it_says_alone():
@@ -124,12 +120,12 @@ def test_what_the_prior_forbids_and_what_it_says_alone():
     tree = changed(predicted(), "prior", **prior, x_c=rng.normal(size=(1, 1000)))
     noise = np.ones((4, 250))
     far = {"rigidity_scale": rng.normal(1.3, 0.01, (4, 250)), "x_c": rng.normal(0.0, 0.9, (4, 250))}
-    found = check(changed(tree, "posterior", noise_scale=noise, **far))
+    found = tb.check(changed(tree, "posterior", noise_scale=noise, **far))
     assert kinds(found) == ["beyond the prior", "set by the prior"]
     assert found.messages[0].details["values"].startswith("rigidity_scale = 1.3 (prior: 0.8")
     assert found.messages[1].details["names"] == "x_c"
     near = {**far, "rigidity_scale": rng.normal(1.0, 0.01, (4, 250))}
-    assert kinds(check(changed(tree, "posterior", noise_scale=noise, **near))) == ["all is well", "set by the prior"]
+    assert kinds(tb.check(changed(tree, "posterior", noise_scale=noise, **near))) == ["all is well", "set by the prior"]
 
 
 def test_a_zero_that_was_not_tared_is_ordinary_where_the_record_determines_it():
@@ -138,7 +134,7 @@ def test_a_zero_that_was_not_tared_is_ordinary_where_the_record_determines_it():
     tree = changed(predicted(), "prior", **prior)
     for width, wrong in ((2e-4, []), (4e-3, ["beyond the prior"])):
         drawn = {"noise_scale": np.ones((4, 250)), "force_y_bias": rng.normal(0.08, width, (4, 250))}
-        found = kinds(check(changed(tree, "posterior", **drawn)))
+        found = kinds(tb.check(changed(tree, "posterior", **drawn)))
         assert [kind for kind in found if kind == "beyond the prior"] == wrong
 
 
@@ -147,29 +143,29 @@ def test_a_zero_that_moved_is_told_unless_that_is_inferred_or_stated():
     for name, wander in zip(CHANNELS, (0.0, 0.2, 0.0), strict=True):
         column = readings(tree)[name]
         tree = with_readings(tree, **{name: column + wander * np.linspace(-0.5, 0.5, column.size)})
-    (moved,) = (message for message in check(tree).messages if message.kind == "zero moved")
+    (moved,) = (message for message in tb.check(tree).messages if message.kind == "zero moved")
     assert moved.details["moved"].startswith("force_x (p = ")
     assert moved.details["entry"] == 'drift = "default" under [unknown] of rig.toml'
-    cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.01))
+    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.01))
     stated = {f"load_cell_{name}": value for name, value in cell.entries().items()}
     for attrs in ({"nuisances": '["force_x_drift"]'}, stated):
         other = tree.copy()
         other.attrs = tree.attrs | attrs
-        assert "zero moved" not in kinds(check(other))
+        assert "zero moved" not in kinds(tb.check(other))
 
 
 def test_a_check_that_was_not_made_is_not_passed():
     tree = predicted().copy()  # as if its rod touched the object at no sample
     events = tree["events"].to_dataset()
     tree["events"] = xr.DataTree(events.assign(snap_off_drive_angle=events["first_drive_angle"]))
-    found = check(tree)
+    found = tb.check(tree)
     assert "too few" in found.predictive.attrs["not_checked"]
     assert not found.predictive.attrs["passed"]
     assert not found.is_well
     assert np.isnan(found.predictive.overall_p_value)
     first = found.messages[0]
     assert (first.kind, first.details["reason"]) == ("not checked", found.predictive.attrs["not_checked"])
-    found = check(predicted(chains=1, draws=20))
+    found = tb.check(predicted(chains=1, draws=20))
     assert found.messages[0].kind == "not checked"
     assert "20 predictions" in found.messages[0].details["reason"]
     assert found.predictive is None
@@ -177,11 +173,11 @@ def test_a_check_that_was_not_made_is_not_passed():
 
 
 READERS = {
-    "check": check,
-    "contour_band": lambda tree: contour_band(tree, [0.0]),
+    "check": tb.check,
+    "contour_band": lambda tree: tb.contour_band(tree, [0.0]),
     "normal_band": lambda tree: normal_band(tree, [0.0]),
-    "to_arviz": to_arviz,
-    "trust": lambda tree: trust(tree, rng=1, replicates=0, assumptions=False),
+    "to_arviz": tb.to_arviz,
+    "trust": lambda tree: tb.trust(tree, rng=1, replicates=0, assumptions=False),
 }
 
 
@@ -200,21 +196,21 @@ def test_a_prediction_that_is_no_number_is_named():
     predictive["force_x"][0, 3, 5] = np.nan
     tree["posterior_predictive"] = xr.DataTree(predictive)
     with refused(InferenceError, "predicted force_x", "chain 0, draw 3"):
-        check(tree)
+        tb.check(tree)
 
 
 @pytest.mark.parametrize("has_way_forth", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_sweep_that_goes_back_in_contact_is_named_if_its_way_forth_is_missing(has_way_forth):
-    rig = Rig(unknown={**NOTHING, "friction": 0.2})
-    drives = [Rotation((0.1, 0.0), "forward", 0.1), Motion(0.0, 0.0, [0.4, 2.2, 0.4], drive_step=0.1)]
-    record = scan(Parabola(0.5, 0.5), rig, drive=drives).record
+    rig = tb.Rig(unknown={**NOTHING, "friction": 0.2})
+    drives = [tb.Rotation((0.1, 0.0), "forward", 0.1), tb.Motion(0.0, 0.0, [0.4, 2.2, 0.4], drive_step=0.1)]
+    record = tb.scan(Parabola(0.5, 0.5), rig, drive=drives).record
     turned = record.sweep.values == 1
     back = turned & (np.cumsum(turned) > 19)
     columns = {"sweep": record.sweep + back, "direction": ("sample", np.where(back, "backward", "forward"))}
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record.assign(columns), rng=1)
+    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record.assign(columns), rng=1)
     measured = measured if has_way_forth else measured.isel(sample=np.flatnonzero(back | ~turned))
-    posterior = infer_contour(measured, rig=rig, rng=1, settings=QUICK)
-    assert (kinds(check(posterior))[-1] == "no way forth") is not has_way_forth
+    posterior = tb.infer_contour(measured, rig=rig, rng=1, settings=QUICK)
+    assert (kinds(tb.check(posterior))[-1] == "no way forth") is not has_way_forth
 
 
 def test_a_right_posterior_is_not_cut_off():
@@ -236,7 +232,7 @@ def walled(monkeypatch):
 
 def test_a_wall_among_the_draws_is_found_and_said_first(walled):
     assert cut_off_parameters(posterior())["q"] == "above"
-    first = check(posterior()).messages[0]
+    first = tb.check(posterior()).messages[0]
     assert first.kind == "cut-off posterior"
     assert "q (above " in first.details["ends"]
 

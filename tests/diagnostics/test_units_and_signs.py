@@ -3,20 +3,19 @@
 import numpy as np
 import pytest
 
+import tactile_bayes as tb
 from helpers.load_cells import CELL
 from tactile_bayes.contours import Circle, paper_profile
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, in_frame
 from tactile_bayes.runs.demonstration import LOAD_CELL
-from tactile_bayes.sweep import scan
 
 STEP = 0.05
 
 
 @pytest.fixture(scope="module")
 def record():
-    return CELL.measure(scan(paper_profile("II", q=0.5), drive_step=STEP).record, rng=1)
+    return CELL.measure(tb.scan(paper_profile("II", q=0.5), drive_step=STEP).record, rng=1)
 
 
 @pytest.mark.parametrize(
@@ -24,7 +23,7 @@ def record():
 )
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_a_right_record_is_not_suspected(contour, direction):
-    record = scan(contour, direction=direction, drive_step=STEP).record
+    record = tb.scan(contour, direction=direction, drive_step=STEP).record
     assert unit_and_sign_findings(record) == ()
     assert unit_and_sign_findings(in_frame(CELL.measure(record, rng=1), "turning")) == ()
 
@@ -57,5 +56,5 @@ def test_wrong_units_and_signs_are_suspected(factors, kind, record):
 
 def test_the_unit_of_force_is_told_for_si(measured):
     wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
-    unit = Rod(measured.rod_length, measured.rod_flexural_rigidity).force_unit
+    unit = tb.Rod(measured.rod_length, measured.rod_flexural_rigidity).force_unit
     assert f"{unit:.3g} N" in unit_and_sign_findings(wrong)[0].details["stated"]

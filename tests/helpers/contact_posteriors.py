@@ -13,25 +13,23 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
+import tactile_bayes as tb
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.draws import weigh_contacts
-from tactile_bayes.load_cell import LoadCell, LoneSamples
+from tactile_bayes.load_cell import LoneSamples
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import samples_of
 from tactile_bayes.record import frame_of, in_frame, loads_of, rod_of
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
 
 NAMES = ("contact_x", "contact_y", "slope_angle")
 
-CELL = LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=0.01)
-EXACT_ANGLE = LoadCell(force_noise=0.05, moment_noise=0.02)
-ROD = Rod(length=0.1, flexural_rigidity=1.2e-5, diameter=0.003)
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=0.01)
+EXACT_ANGLE = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+ROD = tb.Rod(length=0.1, flexural_rigidity=1.2e-5, diameter=0.003)
 SUMS, REACH = 4, 6.0  # number of independent sums, and extent of their grids [standard deviations]
-SI_CELL = LoadCell(force_noise=0.05 * ROD.force_unit, moment_noise=0.02 * ROD.moment_unit, drive_angle_noise=0.01)
+SI_CELL = tb.LoadCell(force_noise=0.05 * ROD.force_unit, moment_noise=0.02 * ROD.moment_unit, drive_angle_noise=0.01)
 
 
 @cache
@@ -42,9 +40,9 @@ def measured(kind: str = "plain") -> xr.Dataset:
     """
     if kind == "SI":
         return SI_CELL.measure(
-            scan(Parabola(5.0, q=0.05), rig=Rig(rod=ROD), drive_step=0.05, base=(0.01, 0.002)).record, rng=3
+            tb.scan(Parabola(5.0, q=0.05), rig=tb.Rig(rod=ROD), drive_step=0.05, base=(0.01, 0.002)).record, rng=3
         )
-    record = scan(paper_profile("II", q=0.5), drive_step=0.05).record
+    record = tb.scan(paper_profile("II", q=0.5), drive_step=0.05).record
     if kind == "turning":
         record = in_frame(record, "turning")
     return (EXACT_ANGLE if kind == "exact angle" else CELL).measure(record, rng=1 if kind == "plain" else 2)
@@ -90,7 +88,7 @@ def moments(points, weight, tangential):
 class Sample:
     """One sample of a record, dimensionless and relative to the pivot, and how likely contacts make it."""
 
-    def __init__(self, record: xr.Dataset, i: int, cell: LoadCell, friction: float = 0.0) -> None:
+    def __init__(self, record: xr.Dataset, i: int, cell: tb.LoadCell, friction: float = 0.0) -> None:
         rod = rod_of(record)
         self.length, self.radius = rod.length_unit, 0.5 * rod.diameter / rod.length_unit
         self.base = np.array([record.base_x.values[i], record.base_y.values[i]]) / self.length
@@ -237,7 +235,7 @@ def _summary(parts) -> Summary:
     return Summary(numbers[:3], np.exp(numbers[3:6]), numbers[6:9], numbers[9], spread, error)
 
 
-def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", friction=0.0) -> ContactDensity:
+def density_of(record: xr.Dataset, cell: tb.LoadCell, which, *, prior="flat", friction=0.0) -> ContactDensity:
     """The package's own density of some samples."""
     samples, rod = samples_of(record, cell), rod_of(record)
     units = rod.load_units

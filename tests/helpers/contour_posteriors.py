@@ -7,25 +7,22 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+import tactile_bayes as tb
 from helpers.load_cells import CELL
 from tactile_bayes.contours import Parabola
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.sweep import scan
+from tactile_bayes.rig import NOTHING
 
 DEVIATIONS = np.array([0.02, 0.05, 0.05])
 STEP = float(np.radians(2.0))
 TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}
 
 # Enough for files and messages, not for numbers.
-QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
+QUICK = tb.SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
 # Too short for anything but the layout of results.
-BRIEF = SamplerSettings(ensembles=2, walkers=16, block_steps=30, max_steps=30, min_ess=1e9)
+BRIEF = tb.SamplerSettings(ensembles=2, walkers=16, block_steps=30, max_steps=30, min_ess=1e9)
 # Enough for means within a fraction of a standard deviation.
-MODEST = SamplerSettings(ensembles=2, walkers=16, min_ess=160, max_r_hat=1.06)
-SOUND = SamplerSettings(ensembles=2, walkers=24, min_ess=400, max_r_hat=1.05)
+MODEST = tb.SamplerSettings(ensembles=2, walkers=16, min_ess=160, max_r_hat=1.06)
+SOUND = tb.SamplerSettings(ensembles=2, walkers=24, min_ess=400, max_r_hat=1.05)
 
 
 NO_PRIORS: Mapping[str, Any] = {}
@@ -37,17 +34,17 @@ def only(*names: str, **said: Any) -> dict[str, Any]:
 
 
 def infer_as_stated(
-    record: xr.Dataset, *, load_cell: LoadCell | None = None, unknown: Mapping[str, Any] = NO_PRIORS, **options: Any
+    record: xr.Dataset, *, load_cell: tb.LoadCell | None = None, unknown: Mapping[str, Any] = NO_PRIORS, **options: Any
 ) -> xr.DataTree:
     """A posterior of a contour and noise alone, but for what is said to be unknown: of few parameters, and quick."""
-    return infer_contour(record, rig=Rig(load_cell=load_cell, unknown=only(**unknown)), **options)
+    return tb.infer_contour(record, rig=tb.Rig(load_cell=load_cell, unknown=only(**unknown)), **options)
 
 
 def swept(contour, *, bases=((0.0, 0.0),), step=STEP, rod=None, friction=0.0, **options) -> xr.Dataset:
     """An exact record of sweeps in both directions from every base."""
-    parts, rig = [], Rig(rod=rod, unknown={"friction": friction})
+    parts, rig = [], tb.Rig(rod=rod, unknown={"friction": friction})
     for k, base in enumerate(bases):
-        part = scan(contour, rig, base=base, drive_step=step, **options).record
+        part = tb.scan(contour, rig, base=base, drive_step=step, **options).record
         part["sweep"] = part.sweep + 2 * k
         parts.append(part)
     return xr.concat(parts, "sample", combine_attrs="override") if parts[1:] else parts[0]

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+import tactile_bayes as tb
 from tactile_bayes.contours import Circle
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import Translation, scan
 
-_CARRIED = Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
+_CARRIED = tb.Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
 _KINDS = (
-    {"rig": Rig(rod=Rod(taper=0.5)), "direction": "forward"},
+    {"rig": tb.Rig(rod=tb.Rod(taper=0.5)), "direction": "forward"},
     {"drive": [_CARRIED]},
-    {"rig": Rig(rod=Rod(taper=0.5)), "drive": [_CARRIED]},
+    {"rig": tb.Rig(rod=tb.Rod(taper=0.5)), "drive": [_CARRIED]},
     {"direction": "forward"},
 )
 
@@ -21,7 +19,7 @@ _KINDS = (
 def compile_share(number: int, of: int) -> None:
     """Compile one share of the forward models, which are cached on disk."""
     for arguments in _KINDS[number::of]:
-        scan(Circle(0.1, 0.6, 0.1), **arguments)
+        tb.scan(Circle(0.1, 0.6, 0.1), **arguments)
 
 
 if __name__ == "__main__":  # beside it a demonstration compiles the last one

@@ -5,28 +5,25 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
+import tactile_bayes as tb
 from helpers.load_cells import CELL
 from tactile_bayes.contours import paper_profile
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, loads_of
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import Scan, scan
+from tactile_bayes.sweep import Scan
 
 STEP = float(np.radians(3.0))
 
 # Enough for predictions of a record, and far from converged.
-SHORT = SamplerSettings(ensembles=4, walkers=12, max_steps=60, min_ess=1e9)
+SHORT = tb.SamplerSettings(ensembles=4, walkers=12, max_steps=60, min_ess=1e9)
 
 
 @cache
 def swept() -> Scan:
     """Profile II at q = 0.5, both sweeps in steps of 3°."""
-    return scan(paper_profile("II", q=0.5), drive_step=STEP)
+    return tb.scan(paper_profile("II", q=0.5), drive_step=STEP)
 
 
-def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250) -> xr.DataTree:
+def predicted(cell: tb.LoadCell = CELL, *, chains: int = 4, draws: int = 250) -> xr.DataTree:
     """A tree as `infer_contour` returns it, of a posterior that is a point, and of a record from it."""
     rng = np.random.default_rng(1)
     ideal = swept().record
@@ -64,8 +61,8 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250) -> xr
 @cache
 def taken_for_a_parabola(profile: str) -> xr.DataTree:
     """The parabola's posterior, of few steps, of a record of one of the paper's profiles; not to be changed."""
-    measured = CELL.measure(scan(paper_profile(profile, q=0.5), drive_step=0.1).record, rng=1)
-    return infer_contour(measured, rig=Rig(load_cell=CELL, unknown="nothing"), rng=1, settings=SHORT)
+    measured = CELL.measure(tb.scan(paper_profile(profile, q=0.5), drive_step=0.1).record, rng=1)
+    return tb.infer_contour(measured, rig=tb.Rig(load_cell=CELL, unknown="nothing"), rng=1, settings=SHORT)
 
 
 def with_readings(tree: xr.DataTree, **readings: np.ndarray) -> xr.DataTree:

@@ -10,14 +10,11 @@ from unittest import mock
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.record import write_record
-from tactile_bayes.rig import Rig, read_record
+import tactile_bayes as tb
 from tactile_bayes.runs import contour as run
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.sweep import scan
 
-FEW = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
+FEW = tb.SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
 
 COLUMN = "<|script><script>alert(1)<|script>"  # what reading makes of a column's name: a slash cannot be stored
 LONG_NAME = "</script><script>alert(2)</script>"
@@ -35,7 +32,7 @@ def undrawn() -> Any:
     return mock.patch.object(run, "_draw", return_value={})
 
 
-def quickly(settings: SamplerSettings) -> Any:
+def quickly(settings: tb.SamplerSettings) -> Any:
     """While it lasts, runs take these settings, whatever they are given."""
     infer = run.infer_contour
     return mock.patch.object(
@@ -51,7 +48,7 @@ def analysed_quickly(record: xr.Dataset, folder, **options) -> run.Run:
 
 def coarse_record() -> xr.Dataset:
     """The demonstration's record, in few samples, as it is measured."""
-    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=np.radians(6.0)).record, rng=1)
+    record = LOAD_CELL.measure(tb.scan(CONTOUR, rig=tb.Rig(rod=ROD), drive_step=np.radians(6.0)).record, rng=1)
     return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
 
 
@@ -76,12 +73,12 @@ def hostile_run(parent):
     attrs = {"units": UNIT, "long_name": LONG_NAME}
     record[COLUMN] = ("sample", np.arange(float(record.sizes["sample"])), attrs)
     path = parent / FILE
-    write_record(record.assign_attrs({ENTRY: VALUE}), path)
+    tb.write_record(record.assign_attrs({ENTRY: VALUE}), path)
     folder = parent / FOLDER
     analysed_quickly(
-        read_record(path),
+        tb.read_record(path),
         folder,
-        rig=Rig(unknown="nothing"),
+        rig=tb.Rig(unknown="nothing"),
         record_file=path,
         command=["tactile-bayes", "infer", FILE, "--out", ENTRY],
     )

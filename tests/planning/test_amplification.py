@@ -10,7 +10,6 @@ import tactile_bayes as tb
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.planning.amplification import METHODS, SOURCES, amplification, contact_errors
 from tactile_bayes.planning.plan import Plan, enlarged
-from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
 
@@ -23,14 +22,14 @@ TALKING = ((1.02, 0.01, -0.02), (0.03, 0.97, 0.01), (-0.01, 0.02, 1.01))
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 SHIFTS = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6)]
 PLANS = {
-    "cross-talk": Plan(PROFILE, Rig(load_cell=replace(QUIET, gain=TALKING, drive_angle_offset=0.02))),
-    "correlated noise": Plan(PROFILE, Rig(load_cell=replace(QUIET, correlation=(0.3, -0.2, 0.5)))),
+    "cross-talk": Plan(PROFILE, tb.Rig(load_cell=replace(QUIET, gain=TALKING, drive_angle_offset=0.02))),
+    "correlated noise": Plan(PROFILE, tb.Rig(load_cell=replace(QUIET, correlation=(0.3, -0.2, 0.5)))),
     "all of it turning": Plan(
         enlarged(PROFILE, 0.2),
-        Rig(THICK, replace(QUIET_SI, drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5))),
+        tb.Rig(THICK, replace(QUIET_SI, drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5))),
     ),
-    "friction": Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6), unknown={"friction": 0.3})),
-    "another pivot": Plan(paper_profile("III", q=0.4), Rig(load_cell=QUIET), drive=tb.Rotation((0.2, -0.1))),
+    "friction": Plan(PROFILE, tb.Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6), unknown={"friction": 0.3})),
+    "another pivot": Plan(paper_profile("III", q=0.4), tb.Rig(load_cell=QUIET), drive=tb.Rotation((0.2, -0.1))),
 }
 
 
@@ -59,7 +58,7 @@ def loaded(plan):
 
 
 def reconstructed(record, plan, method):
-    rig = Rig(rod=plan.rod, load_cell=plan.cell, unknown={"friction": plan.friction})
+    rig = tb.Rig(rod=plan.rod, load_cell=plan.cell, unknown={"friction": plan.friction})
     found = tb.reconstruct(record, method=method, rig=rig)
     return np.array([found.contact_x.values, found.contact_y.values])
 
@@ -105,7 +104,7 @@ def test_gains_are_differences_of_reconstruct(name, method):
 
 
 def test_gains_of_a_carried_rod_are_differences_of_reconstruct():
-    plan = Plan(CIRCLE, Rig(load_cell=QUIET), drive=SHIFTS)
+    plan = Plan(CIRCLE, tb.Rig(load_cell=QUIET), drive=SHIFTS)
     found, record = contact_errors(plan), loaded(plan)
     strong = np.hypot(record.force_x, record.force_y).values > 0.2
     assert strong.sum() > 10
@@ -114,13 +113,13 @@ def test_gains_of_a_carried_rod_are_differences_of_reconstruct():
 
 
 def test_distances_are_along_the_drive():
-    plan = Plan(CIRCLE, Rig(load_cell=QUIET), drive=replace(SHIFTS[0], drive_step=0.05))
+    plan = Plan(CIRCLE, tb.Rig(load_cell=QUIET), drive=replace(SHIFTS[0], drive_step=0.05))
     found, (sweep,) = amplification(plan), plan.scan.sweeps
     travel = 0.8 - found.base_x.values
     np.testing.assert_allclose(found.after_first_contact, travel - sweep.first_contact.travel, atol=1e-12)
     np.testing.assert_allclose(found.before_snap_off, sweep.snap_off.travel - travel, atol=1e-12)
     assert {found[name].attrs["units"] for name in ("after_first_contact", "before_snap_off")} == {"1"}
-    both = amplification(Plan(CIRCLE, Rig(load_cell=QUIET), drive=[tb.Rotation(), SHIFTS[0]]))
+    both = amplification(Plan(CIRCLE, tb.Rig(load_cell=QUIET), drive=[tb.Rotation(), SHIFTS[0]]))
     assert both.before_snap_off.attrs["units"] == "rad, 1"
 
 
@@ -151,7 +150,7 @@ def test_standard_deviations_are_those_that_reconstruct_states():
     plan, grown = in_the_middle("all of it turning")
     record = loaded(plan)
     for method in METHODS:
-        stated = tb.reconstruct(record, method=method, rig=Rig(rod=plan.rod, load_cell=plan.cell))
+        stated = tb.reconstruct(record, method=method, rig=tb.Rig(rod=plan.rod, load_cell=plan.cell))
         of = grown.sel(reconstruction=method)
         np.testing.assert_allclose(of.sd_along.values, stated.tangent_sd.values, rtol=1e-3)
         np.testing.assert_allclose(of.sd_across.values, stated.normal_sd.values, rtol=1e-3)

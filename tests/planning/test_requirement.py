@@ -16,10 +16,9 @@ from tactile_bayes.load_cell import RandomWalk
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise, required_rod
-from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
-PLAN = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=np.radians(9.0)))
+PLAN = Plan(PROFILE, tb.Rig(load_cell=CELL), drive=tb.Rotation(drive_step=np.radians(9.0)))
 
 CELLS = {
     "white": CELL,
@@ -37,7 +36,7 @@ SHARED = [pytest.param(name, "gap", marks=pytest.mark.slow) for name in ("encode
 @pytest.mark.parametrize(("name", "where"), [("in proportion", "gap"), ("white", "touched"), *SHARED])
 def test_a_load_cell_as_asked_for_gives_the_band_that_was_wanted(name, where):
     """Whatever else about it stays as it is."""
-    plan = replace(PLAN, rig=Rig(load_cell=CELLS[name]))
+    plan = replace(PLAN, rig=tb.Rig(load_cell=CELLS[name]))
     present = float(information(plan)[f"{where}_width"])
     needed = required_noise(plan, 0.7 * present, where=where)
     assert float(needed.present_width) == pytest.approx(present, rel=1e-9)
@@ -45,7 +44,7 @@ def test_a_load_cell_as_asked_for_gives_the_band_that_was_wanted(name, where):
     assert factor < 0.7 + 1e-6  # what stays takes its share
     better = replace(plan.cell, force_noise=float(needed.force_noise[0]), moment_noise=float(needed.moment_noise[0]))
     assert better.force_noise == pytest.approx(factor * 0.05)
-    got = information(replace(plan, rig=Rig(load_cell=better)))
+    got = information(replace(plan, rig=tb.Rig(load_cell=better)))
     assert float(got[f"{where}_width"]) == pytest.approx(0.7 * present, rel=1e-4)
     everywhere = float(required_noise(plan, present).present_width)  # the mean of all places
     assert everywhere == pytest.approx(2.0 * 1.959963985 * float(information(plan).height_sd.mean()), rel=1e-6)
@@ -63,7 +62,7 @@ def test_noise_is_in_proportion_to_the_band_where_priors_say_little():
 def test_a_rod_in_si_needs_the_same():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-    si = required_noise(Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive=PLAN.drive), 0.2 * 0.003)
+    si = required_noise(Plan(Parabola(2.5, 0.1), tb.Rig(load_cell=cell, rod=rod), drive=PLAN.drive), 0.2 * 0.003)
     plain = required_noise(PLAN, 0.003)
     for name, scale, units in (
         ("noise_factor", 1.0, ("1", "1")),
@@ -89,7 +88,7 @@ def test_what_no_load_cell_gives_is_refused():
     for width in (0.0, np.inf, [0.1, 0.0], [[0.1]]):
         with refused(ParameterError, band_width=np.atleast_1d(width).tolist()):
             required_noise(PLAN, width)
-    without_zero = replace(PLAN, rig=Rig(load_cell=CELLS["bias"]))
+    without_zero = replace(PLAN, rig=tb.Rig(load_cell=CELLS["bias"]))
     with refused(ParameterError, "1e-12", "unknowns"):
         required_noise(without_zero, [1e-3, 1e-12])
     with refused(ParameterError, "gap"):
@@ -100,7 +99,7 @@ def test_what_no_load_cell_gives_is_refused():
 
 ROD = tb.Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
 SI_CELL = tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
-METAL = Plan(Parabola(2.5, 0.1), Rig(ROD, SI_CELL), drive=PLAN.drive)
+METAL = Plan(Parabola(2.5, 0.1), tb.Rig(ROD, SI_CELL), drive=PLAN.drive)
 LENGTHS, DIAMETERS = [0.09, 0.17, 0.2], [0.3e-3, 0.7e-3, 3e-3]
 
 

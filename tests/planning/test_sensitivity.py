@@ -16,8 +16,7 @@ from tactile_bayes.planning.information import information
 from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise
-from tactile_bayes.planning.sensitivity import PARTS, sensitivity
-from tactile_bayes.rig import Rig
+from tactile_bayes.planning.sensitivity import PARTS
 
 PROFILE = paper_profile("II", q=0.5)
 STEP = 0.1
@@ -25,7 +24,7 @@ STEP = 0.1
 
 @cache
 def plain(rod=None):
-    return tb.sensitivity(rng=1, samples=4, drive=tb.Rotation(drive_step=STEP), rig=Rig(rod=rod))
+    return tb.sensitivity(rng=1, samples=4, drive=tb.Rotation(drive_step=STEP), rig=tb.Rig(rod=rod))
 
 
 def in_si():
@@ -86,13 +85,13 @@ def test_words_name_the_channel_that_is_missed_most():
 def test_a_drive_that_carries_the_base_adds_to_what_is_known(first):
     carried = tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6)
     circle, parts = tb.contours.Circle(0.3, 0.8), ["information", "required_noise"]
-    found = [sensitivity(circle, rng=1, drive=d, parts=parts) for d in ([first], [first, carried])]
+    found = [tb.sensitivity(circle, rng=1, drive=d, parts=parts) for d in ([first], [first, carried])]
     alone, both = (each["information"].bound.sel(parameter=["r", "q", "x_c"]) for each in found)
     assert np.all(np.isfinite(alone))
     assert np.all(both <= alone + 1e-12)
 
 
-LOUD = Rig(load_cell=tb.LoadCell(force_noise=50.0, moment_noise=20.0))
+LOUD = tb.Rig(load_cell=tb.LoadCell(force_noise=50.0, moment_noise=20.0))
 
 
 @pytest.mark.parametrize(
@@ -105,7 +104,7 @@ LOUD = Rig(load_cell=tb.LoadCell(force_noise=50.0, moment_noise=20.0))
     ids=["a band that priors give", "first order does not hold", "one sweep"],
 )
 def test_words_say_what_is_particular(options, said):
-    tree = sensitivity(rng=1, **options)
+    tree = tb.sensitivity(rng=1, **options)
     assert set(tree.children) == set(options["parts"])  # only what is asked for is made
     (line,) = words(tree, said)
     assert "gap" not in line
@@ -115,10 +114,10 @@ def test_words_say_what_is_particular(options, said):
     ("options", "error", "named"),
     [
         ({"parts": ["information", "gap"]}, ParameterError, ["parts", "['information', 'gap']"]),
-        ({"rig": Rig(load_cell=tb.LoadCell(moment_noise=0.02))}, ParameterError, ["force_x, force_y"]),
+        ({"rig": tb.Rig(load_cell=tb.LoadCell(moment_noise=0.02))}, ParameterError, ["force_x, force_y"]),
         ({"contour": Parabola(0.5, 1.5)}, ReachError, ["out of reach"]),
     ],
 )
 def test_what_is_impossible_is_refused(options, error, named):
     with refused(error, *named):
-        sensitivity(rng=1, **options)
+        tb.sensitivity(rng=1, **options)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import tactile_bayes as tb
 from helpers import contour_posteriors as posteriors
 from helpers.contour_posteriors import TRUTH, posterior, touched
 from helpers.refusals import refused
@@ -11,9 +12,7 @@ from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.base import Locus
 from tactile_bayes.contours.shape_free import ShapeFree
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.sweep import scan
-from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.gap import gap, triangle
+from tactile_bayes.uncertainty.gap import triangle
 
 BOTH = ["forward", "backward"]
 A, Q, X_C = 0.5, 0.3, 0.05
@@ -42,7 +41,7 @@ def spread(size=500):
 def test_bounds_are_quantiles():
     """The triangle of a parabola is half of a w² wide, and its apex in the middle."""
     made, left, right, a, q, x_c = spread()
-    found = gap(made, 0.9)
+    found = tb.gap(made, 0.9)
     expected = {
         "left": left,
         "right": right,
@@ -65,7 +64,7 @@ def test_bounds_are_quantiles():
 
 
 def test_one_contour_has_its_triangle_and_no_band():
-    found = gap(tree([[[0.2, -0.1]] * 5]))
+    found = tb.gap(tree([[[0.2, -0.1]] * 5]))
     np.testing.assert_allclose(found.triangle_width, 0.5 * A * 0.3**2, rtol=1e-13)
     y = A * (found.x - X_C) ** 2 + Q
     np.testing.assert_allclose(found.band_median, y, rtol=1e-14)
@@ -78,19 +77,19 @@ def test_one_contour_has_its_triangle_and_no_band():
 def test_bands_are_compared_over_the_same_places():
     made, other = spread()[0], spread()[0]
     other["posterior"]["q"] = other["posterior"]["q"] + 3.0 * (other["posterior"]["q"] - Q)
-    found = gap(made, 0.9, without_events=other)
+    found = tb.gap(made, 0.9, without_events=other)
     # Quantiles are in order because each contour is in its own triangle.
     assert (found.triangle_lower <= found.band_lower + 1e-12).all()
     assert (found.triangle_upper >= found.band_upper - 1e-12).all()
     assert (found.x[0], found.x[-1]) == (found.left.sel(bound="median"), found.right.sel(bound="median"))
     for name, posterior_ in (("band", made), ("band_without_events", other)):
-        band = contour_band(posterior_, found.x.values, 0.9)
+        band = tb.contour_band(posterior_, found.x.values, 0.9)
         for edge in ("lower", "median", "upper"):
             np.testing.assert_array_equal(found[f"{name}_{edge}"], band[edge])
         widest = float((band.upper - band.lower).max())
         assert found[name.replace("band", "band_width")].item() == widest
     assert found.band_width < found.band_width_without_events
-    assert "band_width_without_events" not in gap(made)
+    assert "band_width_without_events" not in tb.gap(made)
 
 
 def test_events_belong_to_the_draws_of_their_labels():
@@ -99,7 +98,7 @@ def test_events_belong_to_the_draws_of_their_labels():
     some = made.copy()
     some["events"] = made["events"].to_dataset().assign_coords(draw=np.arange(500)).isel(draw=slice(3, None, 7))
     expected = np.median(np.arctan(2.0 * a * (right - x_c))[:, 3::7])
-    np.testing.assert_allclose(gap(some).right_slope_angle.sel(bound="median"), expected, rtol=1e-12)
+    np.testing.assert_allclose(tb.gap(some).right_slope_angle.sel(bound="median"), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -113,7 +112,7 @@ def test_events_belong_to_the_draws_of_their_labels():
     ],
 )
 def test_several_pivots_leave_open_what_none_has_reached(last, first, left, right, gaps):
-    found = gap(tree([[last]], ["forward", "backward"] * 2, first=first))
+    found = tb.gap(tree([[last]], ["forward", "backward"] * 2, first=first))
     middle = found.sel(bound="median")
     assert (float(middle.left), float(middle.right), found.attrs["gaps"]) == (left, right, gaps)
     assert float(middle.width) == pytest.approx(right - left)
@@ -121,7 +120,7 @@ def test_several_pivots_leave_open_what_none_has_reached(last, first, left, righ
 
 
 def test_sweeps_may_overlap():
-    found = gap(tree([[[-0.1, 0.1]]]))
+    found = tb.gap(tree([[[-0.1, 0.1]]]))
     assert float(found.width.sel(bound="median")) == pytest.approx(-0.2)
     assert "no gap" in found.status.item()
     for name in ("triangle_width", "apex_x", "band_width", "band_lower", "triangle_upper"):
@@ -129,12 +128,12 @@ def test_sweeps_may_overlap():
 
 
 def test_sweeps_may_overlap_in_some_contours():
-    found = gap(tree([[[0.1, -0.1], [0.1, -0.1], [0.1, 0.12]]]))
+    found = tb.gap(tree([[[0.1, -0.1], [0.1, -0.1], [0.1, 0.12]]]))
     np.testing.assert_allclose(found.triangle_width, 0.5 * A * 0.2**2, rtol=1e-13)
     assert found.share_open.item() == pytest.approx(2.0 / 3.0)
     assert "overlap in some" in found.status.item()
     assert np.isfinite(found.band_width)
-    found = gap(tree([[[0.1, -0.1], [0.1, 0.14], [0.1, 0.12]]]))
+    found = tb.gap(tree([[[0.1, -0.1], [0.1, 0.14], [0.1, 0.12]]]))
     assert "overlap in most" in found.status.item()
     assert np.isnan(found.band_width)
     assert np.isfinite(found.triangle_width).all()
@@ -143,9 +142,9 @@ def test_sweeps_may_overlap_in_some_contours():
 def test_of_an_inferred_contour():
     """The true gap, its vertex and its angles lie within central intervals of 99.99 %."""
     truth = Parabola(**TRUTH)
-    events = scan(truth).events
+    events = tb.scan(truth).events
     last = {"left": events["backward"].snap_off, "right": events["forward"].snap_off}
-    found = gap(posterior(), 0.9999)
+    found = tb.gap(posterior(), 0.9999)
     true = {side: event.contact_x for side, event in last.items()}
     true |= {f"{side}_y": event.contact_y for side, event in last.items()}
     true |= {f"{side}_slope_angle": event.slope_angle for side, event in last.items()}
@@ -182,7 +181,7 @@ def test_draws_without_an_event_do_not_count():
     rest["events"] = xr.DataTree(
         made["events"].to_dataset().assign_coords(draw=number).isel(draw=(number % 7 > 0) & (number % 11 > 0))
     )
-    found, expected = gap(lost, 0.9), gap(rest, 0.9)
+    found, expected = tb.gap(lost, 0.9), tb.gap(rest, 0.9)
     for name in ("left", "right", "width", "triangle_height", "snap_off_drive_angle", "band_lower", "band_upper"):
         np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
     assert expected.status == "ok"
@@ -203,7 +202,7 @@ NEVER = np.zeros(500, dtype=bool)
 )
 def test_what_leaves_no_gap_is_refused(made, named):
     with refused(InferenceError, named):
-        gap(made)
+        tb.gap(made)
 
 
 def at(contour, *x):

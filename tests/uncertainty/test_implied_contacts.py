@@ -6,21 +6,15 @@ from functools import cache
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from helpers.contour_posteriors import CELL, measured, posterior, swept
 from helpers.pictures import own_axes
 from helpers.refusals import refused
-from tactile_bayes import plotting
+from tactile_bayes import Rig, Rod, infer_contacts, plotting, reconstruct, scan
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.contact_posterior import infer_contacts
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import in_frame, record_hash
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.contact_region import contact_moments, contact_region
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 
@@ -268,8 +262,3 @@ def test_the_figure_refuses_what_does_not_belong_together(changes, options, name
     given = {"implied": implied, "contacts": single, "axes": lambda: own_axes(5)} | changes
     with refused(ParameterError, *named):
         plotting.tightening(given["implied"](), given["contacts"](), axes=given["axes"](), **options)
-
-
-def test_ellipses_of_moments_are_drawn():
-    ax = plotting.contact_ellipses(contact_moments(implied()), ax=Figure().subplots())
-    assert len([patch for patch in ax.patches if isinstance(patch, Ellipse)]) == 12

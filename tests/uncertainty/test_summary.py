@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import tactile_bayes as tb
 from helpers.contour_posteriors import posterior
 from helpers.refusals import refused
 from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.report.page import parameter_cells
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
-from tactile_bayes.uncertainty.band import contour_band, normal_band
+from tactile_bayes.uncertainty.band import normal_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach, reach, reach_attributes
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
@@ -54,7 +52,7 @@ def test_the_band_is_where_events_are(analysed):
         reach(posterior)
 
 
-@pytest.mark.parametrize("band", [contour_band, normal_band])
+@pytest.mark.parametrize("band", [tb.contour_band, normal_band])
 def test_a_band_says_where_the_rod_cannot_touch(band):
     found = band(posterior(), [-100.0, -1.01, -0.99, 0.0, 0.99, 1.01, 100.0])
     assert found.status.values.tolist() == [*[BEYOND_REACH] * 2, *["ok"] * 3, *[BEYOND_REACH] * 2]
@@ -63,8 +61,8 @@ def test_a_band_says_where_the_rod_cannot_touch(band):
 
 def test_the_reach_is_that_of_all_pivots_and_of_stem_and_diameter():
     contour = paper_profile("II", q=0.5)
-    record = scan(
-        contour, base=[(0.0, 0.0), (0.2, 0.0)], rig=Rig(rod=Rod(stem=0.1, diameter=0.02)), drive_step=0.1
+    record = tb.scan(
+        contour, base=[(0.0, 0.0), (0.2, 0.0)], rig=tb.Rig(rod=tb.Rod(stem=0.1, diameter=0.02)), drive_step=0.1
     ).record
     assert list(reach_attributes(record).values()) == pytest.approx([-1.11, 1.31])
 

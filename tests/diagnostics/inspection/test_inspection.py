@@ -14,11 +14,8 @@ from tactile_bayes.diagnostics.inspection import known_cell
 from tactile_bayes.diagnostics.inspection.samples import autocorrelation, outliers, repeat_chance, stuck, uneven_steps
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.sweep import scan
 
 COARSE = np.radians(12.0)
 OTHER_FORCE_X = 'force_x had the other sign (force_x = "-force_x" under [file] of rig.toml).'
@@ -28,7 +25,7 @@ NOTHING = ("Nothing looks wrong.",)
 
 @pytest.fixture(scope="module")
 def ideal():
-    return tb.scan(CONTOUR, rig=Rig(rod=ROD)).record
+    return tb.scan(CONTOUR, rig=tb.Rig(rod=ROD)).record
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +37,7 @@ def record(ideal):
 @pytest.fixture(scope="module")
 def coarse():
     """In steps of 12°, where few samples will do."""
-    return bare(LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=COARSE).record, rng=1))
+    return bare(LOAD_CELL.measure(tb.scan(CONTOUR, rig=tb.Rig(rod=ROD), drive_step=COARSE).record, rng=1))
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +71,7 @@ def put(record, name, where, value):
 
 
 def words(record, load_cell=None, friction=0.0):
-    return tb.inspect_record(record, Rig(load_cell=load_cell, unknown={"friction": friction})).messages
+    return tb.inspect_record(record, tb.Rig(load_cell=load_cell, unknown={"friction": friction})).messages
 
 
 # --- A good record --------------------------------------------------------------------------------------------------
@@ -90,7 +87,7 @@ def test_nothing_is_said_of_a_good_record(record):
     assert found.sweeps.direction.values.tolist() == ["forward", "backward"]
     assert np.degrees(found.sweeps.drive_step.values) == pytest.approx([1.0, 1.0])
     snap_offs = np.degrees(found.sweeps.snap_off_drive_angle.values)
-    events = tb.scan(CONTOUR, rig=Rig(rod=ROD)).events
+    events = tb.scan(CONTOUR, rig=tb.Rig(rod=ROD)).events
     for between, direction in zip(snap_offs, ("forward", "backward"), strict=True):
         assert between.min() <= np.degrees(events[direction].snap_off.drive_angle) <= between.max()
     assert sum(found.statuses.values()) == record.sizes["sample"]
@@ -99,9 +96,9 @@ def test_nothing_is_said_of_a_good_record(record):
 
 CELLS = {
     "usual": CELL,
-    "poor": LoadCell(force_noise=0.2, moment_noise=0.08, bias=(0.3, 0.1, -0.4)),
+    "poor": tb.LoadCell(force_noise=0.2, moment_noise=0.08, bias=(0.3, 0.1, -0.4)),
     "steps": replace(CELL, force_resolution=0.05, moment_resolution=0.02),
-    "coarse": LoadCell(force_noise=0.02, moment_noise=0.01, force_resolution=0.1, moment_resolution=0.05),
+    "coarse": tb.LoadCell(force_noise=0.02, moment_noise=0.01, force_resolution=0.1, moment_resolution=0.05),
     "turning": replace(CELL, drive_angle_noise=3e-3, frame="turning"),
     "drift": replace(CELL, drift=tb.load_cell.RandomWalk(moment=2e-3, force=5e-3)),
     # Gain beside which the noise of loads is five times that of readings.
@@ -156,7 +153,7 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
         force_range=0.12,
         drive_angle_offset=0.02,
     )
-    measured = cell.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.5 * COARSE).record, rng=1)
+    measured = cell.measure(tb.scan(CONTOUR, rig=tb.Rig(rod=ROD), drive_step=0.5 * COARSE).record, rng=1)
     assert (np.abs(measured.force_y.values) == 0.12).any()
     stated = measured.assign_attrs(load_cell_gain_force_x_force_x=0.2, load_cell_gain_force_x_force_y=-0.01)
     assert correction(words(stated)) == OTHER_FORCE_X
@@ -216,7 +213,7 @@ def test_a_world_in_which_all_fits_but_lies_below_the_pivot_is_told(coarse):
 
 
 def test_friction_is_named():
-    dragged = tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3}), drive_step=COARSE).record
+    dragged = tb.scan(CONTOUR, rig=tb.Rig(rod=ROD, unknown={"friction": 0.3}), drive_step=COARSE).record
     measured = LOAD_CELL.measure(dragged, rng=1)
     assert correction(words(measured)).startswith("there were friction of about 0.3")
     assert words(measured, friction=0.3) == NOTHING
@@ -332,7 +329,7 @@ def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
 
 def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal, record):
     drift = tb.load_cell.OrnsteinUhlenbeck(force=6e-3, time=5.0)
-    cell = LoadCell(force_noise=1e-3, moment_noise=2.5e-4, drift=drift)
+    cell = tb.LoadCell(force_noise=1e-3, moment_noise=2.5e-4, drift=drift)
     measured = cell.measure(ideal, rng=1)
     assert words(measured) == NOTHING  # as it is stated
     assert "noise not white" in [sentence.kind for sentence in words(bare(measured))]
@@ -340,7 +337,7 @@ def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal, record):
     assert first.kind == "noise not as stated"
     assert first.details == {"channel": "force_x", "found": "2.91 mN", "stated": "1 mN"}
     without_deviation = tb.LoadCell(force_noise=3e-3, moment_noise=2.5e-4, degrees_of_freedom=2.0)
-    found = tb.inspect_record(record, rig=Rig(load_cell=without_deviation))
+    found = tb.inspect_record(record, rig=tb.Rig(load_cell=without_deviation))
     assert np.isnan(found.channels.stated_noise.values).all()
     assert found.messages == NOTHING
 
@@ -453,12 +450,12 @@ def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):
 
 def test_step_2_corrects_for_known_deviations():
     """As `reconstruct` does, and then nothing looks wrong."""
-    cell = LoadCell(force_noise=0.005, moment_noise=0.002)
-    rig = Rig(load_cell=cell, unknown={"lever": 0.1, "force_y_gain": 1.3, "moment_gain": 0.8})
-    record = rig.measure(scan(paper_profile("II", q=0.5), rig, drive_step=0.05).record, rng=1)
+    cell = tb.LoadCell(force_noise=0.005, moment_noise=0.002)
+    rig = tb.Rig(load_cell=cell, unknown={"lever": 0.1, "force_y_gain": 1.3, "moment_gain": 0.8})
+    record = rig.measure(tb.scan(paper_profile("II", q=0.5), rig, drive_step=0.05).record, rng=1)
     told = tb.inspect_record(record, rig)
     own = tb.reconstruct(record, rig, method="raw").status.values
     assert told.statuses == {str(each): np.count_nonzero(own == each) for each in np.unique(own)}
-    untold = tb.inspect_record(record, Rig(load_cell=cell, unknown="nothing"))
+    untold = tb.inspect_record(record, tb.Rig(load_cell=cell, unknown="nothing"))
     assert not told.is_suspect
     assert untold.statuses != told.statuses
