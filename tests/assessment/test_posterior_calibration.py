@@ -5,7 +5,7 @@ from helpers.contour_posteriors import posterior
 from tactile_bayes.assessment import posterior_calibration as module
 from tactile_bayes.assessment.posterior_calibration import JointModel, posterior_calibration
 from tactile_bayes.errors import CalibrationError, InferenceError
-from tactile_bayes.inference.stored_experiment import experiment_of, points_of
+from tactile_bayes.inference.experiment import experiment_of, points_of
 
 
 def test_the_joint_density_has_the_prior_once_and_both_likelihoods():

@@ -3,8 +3,8 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL, SOUND, infer_as_stated, measured, posterior
 from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
+from tactile_bayes.inference.experiment import experiment_of
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.stored_experiment import experiment_of
 
 REGIONS = {"in_gap": np.linspace(-0.05, 0.05, 3), "beside": np.array([-0.4, 0.4])}
 

@@ -8,8 +8,7 @@ from tactile_bayes.assessment.split_prediction import parts_of, split_prediction
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.inference.experiment import Experiment, experiment_of
 from tactile_bayes.rig import NOTHING, Rig
 
 

@@ -8,9 +8,8 @@ from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.comparison.leave_one_out import predicted_samples
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.rig import Rig
 

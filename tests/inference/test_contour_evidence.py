@@ -7,10 +7,9 @@ from scipy import stats
 from helpers.contour_posteriors import CELL, only, swept
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_evidence import WIDTHS, contour_evidence
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.evidence import WIDTHS, contour_evidence
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.family import Family
 from tactile_bayes.rig import Rig
 

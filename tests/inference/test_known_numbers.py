@@ -10,9 +10,8 @@ import xarray as xr
 
 from helpers.contour_posteriors import BRIEF, infer_as_stated, only, swept
 from helpers.known_numbers import scaled
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, found_rig
 from tactile_bayes.inference.family import Gauge
-from tactile_bayes.inference.stored_experiment import found_rig
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.report.frames import motion_of
 from tactile_bayes.rig import Rig

@@ -8,8 +8,8 @@ from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, measured, o
 from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.experiment import experiment_of, points_of
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.stored_experiment import experiment_of, points_of
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan

@@ -16,9 +16,9 @@ from helpers.contour_posteriors import BRIEF, CELL, SOUND, measured, only, poste
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_evidence import contour_evidence
+from tactile_bayes.inference.evidence import contour_evidence
+from tactile_bayes.inference.experiment import points_of
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.stored_experiment import points_of
 from tactile_bayes.inference.target import Target, result, target
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.report.reproduction import hindrances

@@ -30,15 +30,12 @@ from tactile_bayes.calibration.summary import summary
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem
-from tactile_bayes.inference.coordinates.base import in_coordinates
-from tactile_bayes.inference.densities import Proposal, flattened
+from tactile_bayes.inference.coordinates import in_coordinates
+from tactile_bayes.inference.densities import Proposal, approximate, flattened, refined
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
-from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.importance import approximate, refined
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, points_of, predicted_points
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.contour_start import Walk
-from tactile_bayes.inference.stored_experiment import points_of, predicted_points
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words, words
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS

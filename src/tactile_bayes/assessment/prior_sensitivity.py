@@ -11,7 +11,7 @@ from arviz_stats.base.array import array_stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.diagnostics.predictive_check import LOST_BELOW
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.stored_experiment import points_of
+from tactile_bayes.inference.experiment import points_of
 from tactile_bayes.uncertainty.band import contour_heights
 
 # Components that are scaled: the prior of the contour, that of rig and noise, and the likelihood.

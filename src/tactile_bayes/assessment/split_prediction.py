@@ -12,8 +12,8 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.assessment.linear_fit import LinearFit, Linearisation
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.experiment import points_of, predicted_points
 from tactile_bayes.inference.result import best_draw
-from tactile_bayes.inference.stored_experiment import points_of, predicted_points
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS
 

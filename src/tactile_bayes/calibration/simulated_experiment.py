@@ -13,9 +13,8 @@ from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, contour_problem
 from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record import rod_of
 from tactile_bayes.sweep import Drive

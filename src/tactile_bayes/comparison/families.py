@@ -21,10 +21,9 @@ from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.evidence import WIDTHS, ContourEvidence, contour_evidence
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.priors import matched_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig

@@ -17,11 +17,10 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem, identity_of
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, settings_of
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, contour_problem, identity_of
 from tactile_bayes.inference.family import Family, Gauge
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.parameters.rig_prior import rig_prior

@@ -15,7 +15,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, log_density_of, quantiles_of, support_of
 from tactile_bayes.errors import ParameterError, ReachError
-from tactile_bayes.inference.coordinates.base import Logarithms
+from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import Ends
 from tactile_bayes.inference.parameters.noise import Noise

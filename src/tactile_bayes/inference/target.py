@@ -18,10 +18,9 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import started
 from tactile_bayes.inference.contour_groups import unit_of, whole_groups
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, settings_of
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, contour_problem
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import OTHER, provenance
 from tactile_bayes.numerics.blocks import blocks

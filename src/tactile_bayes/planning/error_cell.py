@@ -15,8 +15,8 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ContourError, InferenceError, ReachError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import contour_problem
 from tactile_bayes.numerics.random_numbers import Seed, child
 from tactile_bayes.planning.amplification import METHODS, along_and_across, contact_errors
 from tactile_bayes.planning.expected_band import stretches

@@ -8,8 +8,7 @@ from tactile_bayes.calibration.calibrate import calibration_replicate, experimen
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle
 from tactile_bayes.contours.families import FAMILIES
-from tactile_bayes.inference.coordinates.base import Logarithms
-from tactile_bayes.inference.coordinates.flank import FlankCoordinates
+from tactile_bayes.inference.coordinates import FlankCoordinates, Logarithms
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.starts.modes import flank_at_contacts

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
+from tactile_bayes.inference.coordinates import Coordinates, Logarithms
 from tactile_bayes.inference.ensembles import run_state
 from tactile_bayes.inference.ensembles.run_state import Block, RunState
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.contours import Smooth
-from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import Anchor
 
 _NODES = 32
 

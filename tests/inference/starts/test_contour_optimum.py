@@ -8,8 +8,7 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL
 from tactile_bayes.contours import Circle, Parabola
-from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of, smooth_optimum
 from tactile_bayes.inference.starts.contour_start import mean_square_left
 from tactile_bayes.rig import NOTHING, Rig

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.starts.pilot import standardise
+from tactile_bayes.inference.starts.contour_start import standardise
 
 _SIZE, _BENT, _WALKERS = 12, 2, 100
 

@@ -13,9 +13,8 @@ from helpers.contour_posteriors import CELL
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_evidence import contour_evidence
-from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.evidence import contour_evidence
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.streams import particles
 from tactile_bayes.inference.streams.stream_state import read_tree, surprise_after
 from tactile_bayes.record.netcdf import write_netcdf

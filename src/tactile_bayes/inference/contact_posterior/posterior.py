@@ -15,7 +15,7 @@ from tactile_bayes.checks import check_function, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
 from tactile_bayes.inference.contact_posterior.draws import CHAINS, LEAST_DRAWS, MixedDraws, draw_contacts, mixed
-from tactile_bayes.inference.importance import LARGEST_K
+from tactile_bayes.inference.densities import LARGEST_K
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.inference.result import library

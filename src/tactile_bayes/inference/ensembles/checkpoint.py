@@ -17,7 +17,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, StoredSteps
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, whole_seed

@@ -9,7 +9,7 @@ import emcee
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 
 Moves = Sequence[tuple[Any, float]]  # moves of an ensemble, with their shares. They keep nothing from step to step.

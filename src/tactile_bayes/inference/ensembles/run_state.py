@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.diagnosis import lost_walkers

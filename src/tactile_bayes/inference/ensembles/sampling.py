@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.coordinates import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, identity_of_run, open_checkpoint

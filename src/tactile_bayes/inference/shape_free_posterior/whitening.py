@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, logarithms, scale_names, split
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation

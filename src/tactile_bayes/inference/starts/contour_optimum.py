@@ -11,7 +11,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import Logarithms
+from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.least_squares import HUBER_THRESHOLD, STEP, Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks

@@ -9,11 +9,9 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
-from tactile_bayes.inference.coordinates.flank import FlankCoordinates
+from tactile_bayes.inference.coordinates import Coordinates, FlankCoordinates, in_coordinates
 from tactile_bayes.inference.deadline import Deadline
-from tactile_bayes.inference.densities import ANYTHING, Ends, Proposal
-from tactile_bayes.inference.importance import EFFICIENT, approximate
+from tactile_bayes.inference.densities import ANYTHING, EFFICIENT, Ends, Proposal, approximate
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather, square_root
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, are_alike, optima_of

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import in_coordinates
+from tactile_bayes.inference.coordinates import in_coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal, effective_number, normalised
 from tactile_bayes.inference.ensembles.moves import FittedMove, step_ensembles
 from tactile_bayes.inference.streams.stream_state import WIDER, StreamState

@@ -18,16 +18,21 @@ from tactile_bayes.checks import check_function, check_numbers, check_path, chec
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import unit_of, whole_groups
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import identity_of
 from tactile_bayes.inference.densities import effective_number, normalised
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings
 from tactile_bayes.inference.ensembles.checkpoint import changes
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, identity_of
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
-from tactile_bayes.inference.streams.growing_record import continued
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, Particles
-from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, surprise_after, tree_of
+from tactile_bayes.inference.streams.stream_state import (
+    StreamState,
+    continued,
+    read_tree,
+    state_in,
+    surprise_after,
+    tree_of,
+)
 from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import validate
