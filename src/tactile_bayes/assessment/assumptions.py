@@ -110,10 +110,7 @@ def band_by_assumption(
 
 
 def alternatives_of(experiment: Experiment, seen: Inspection | None = None) -> list[Alternative]:
-    """Return the experiments that differ in one assumption, except those that the record cannot identify.
-
-    What an inspection of the record has seen is looked up if it is not given.
-    """
+    """Return the experiments that differ in one assumption, except those that the record cannot identify."""
     names, found = set(experiment.unknowns.names), []
     for group in _UNKNOWNS:
         members = {name for name in names if belongs(name, group)}

@@ -58,10 +58,9 @@ class LinearFit(NamedTuple):
     def disagreement(self, rest: Flags) -> Disagreement:
         """Compare the samples `rest`, a mask of shape (samples,), with what all others predict.
 
-        With r the residuals of the rest at the joint optimum, J their slopes and C the joint covariance, r is normal
-        with covariance 1 − J C Jᵀ before the rest is read. It is projected on J, and on the zeros of the channels, also
-        if these are taken as stated and are no parameters. The change of the parameters by the rest is C(1 + I C')Jᵀr,
-        where I is the information of the rest and C' the covariance without it.
+        With residuals r of the rest, slopes J and joint covariance C, r has the covariance 1 − J C Jᵀ before the rest
+        is read. It is projected on J, and on the zeros of channels, also if these are no parameters. The parameters
+        change by C(1 + I C')Jᵀr, with the information I of the rest and the covariance C' without it.
         """
         slopes = self.slopes[rest].reshape(-1, self.slopes.shape[-1])
         projected = np.hstack([slopes, self.zeros[rest].reshape(len(slopes), -1)])
@@ -87,10 +86,7 @@ class LinearFit(NamedTuple):
 
 
 class Linearisation:
-    """Linear fits of records that were measured as that of a model, from the posterior's deviations, shape (d,).
-
-    It refuses more than 2000 samples that share a drift process, or a bias that is integrated out.
-    """
+    """Linear fits of records that were measured as that of a model, from the posterior's deviations, shape (d,)."""
 
     def __init__(self, model: ContourModel, scales: Floats) -> None:
         self.model = model
@@ -114,10 +110,7 @@ class Linearisation:
             )
 
     def fits(self, readings: Floats, starts: Floats) -> list[LinearFit | None]:
-        """Return the fits of records, each from a start; None where the rod does not reach its contour.
-
-        Shapes: readings (records, samples, 3), starts (records, d).
-        """
+        """Return fits of readings (records, samples, 3), each from a start, (records, d); None out of reach."""
         found: list[LinearFit | None] = []
         numbers = (2 * self._count + 3) * readings[0].size
         for block in blocks(len(readings), numbers):

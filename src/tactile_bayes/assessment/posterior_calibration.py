@@ -115,10 +115,8 @@ def posterior_calibration(
 ) -> xr.Dataset:
     """Test whether the intervals of a posterior hold here: for truths drawn from it, and records predicted from them.
 
-    Each truth is inferred from the record and the predicted one together. If posterior and sampler are right, its rank
-    among the draws is uniform (posterior simulation-based calibration: Säilynoja, Schmitt, Bürkner & Vehtari 2025,
-    arXiv:2502.03279). In contrast to `calibrate`, truths are like the object and rig at hand. It is no test of the
-    assumptions, which are those of the simulation as well.
+    Each truth is inferred from the record and the predicted one together: if posterior and sampler are right, its rank
+    is uniform (Säilynoja, Schmitt, Bürkner & Vehtari 2025, arXiv:2502.03279). It is no test of the assumptions.
     """
     task = _task(posterior, experiment, replicates, probability, seed)
     with open_results_store(task.identity, out, REPLICATES) as store:

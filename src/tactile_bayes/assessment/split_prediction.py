@@ -26,13 +26,11 @@ _NOISE = "noise"
 def split_prediction(posterior: xr.DataTree, model: ContourModel) -> xr.Dataset:
     """Predict each part of a record from all others, and compare.
 
-    At the joint optimum the score of the rest is normal, with a covariance that follows from the slopes of the readings
-    to first order: its quadratic form over the scatter of all residuals has an F distribution. The zeros of the
-    channels are compared as well, whether they are inferred or not. No alternative model is fitted. The F statistics of
-    records that the posterior predicts, each fitted like the real one, correct their mean (Bartlett 1937, doi
-    10.1098/rspa.1937.0109), and calibrate the least p-value of all parts, so that the share of false alarms is as
-    stated with few samples as well. "noise" compares the scatter with that of predicted records: it differs only if
-    the noise is known, since noise that is inferred explains any misfit.
+    At the joint optimum the score of the rest is normal to first order: its quadratic form over the scatter of all
+    residuals has an F distribution. Those of records that the posterior predicts, fitted alike, correct its mean
+    (Bartlett 1937, doi 10.1098/rspa.1937.0109), and calibrate the least p-value of all parts. "noise" compares the
+    scatter with that of predicted records: it differs only if the noise is known, since noise that is inferred explains
+    any misfit.
     """
     points = points_of(posterior, model.names)
     predicted = predicted_readings(posterior)
@@ -62,8 +60,7 @@ def predicted_readings(posterior: xr.DataTree) -> Floats:
 def parts_of(model: ContourModel) -> dict[str, Flags]:
     """Return the parts of a record that predict the rest, masks of shape (samples,) by name.
 
-    They are each sweep segment, as "sweep 1" and so on, if there are several; each pivot likewise; and the earlier and
-    the later half of the samples of every segment, which divide its contacts in the middle.
+    They are each sweep segment and each pivot, of several, and both halves of the contacts of every segment.
     """
     likelihood = model.likelihood
     of_sample, count = likelihood.segments.of_sample, len(likelihood.segments)

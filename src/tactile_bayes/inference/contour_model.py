@@ -38,9 +38,8 @@ _FEWEST_TRIALS = 1000  # draws of the prior before none within reach is an error
 class ContourModel:
     """Prior times likelihood, as a function of arrays of parameters, in the record's units.
 
-    Points, (n, d), have the parameters `names`: of the contour, the rig (both are `forward_parameters`), the noise, and
-    a discrepancy. `of_path` are the columns of those that move samples along the path; `zero` (NaN if unknown) and
-    `deviation` are those of each channel [EI/L, EI/L²].
+    Points, (n, d), have the parameters `names`: of the contour and the rig (both are `forward_parameters`), the noise,
+    a discrepancy. `of_path` are columns that move samples on the path; `zero` and `deviation` are by channel.
     """
 
     def __init__(

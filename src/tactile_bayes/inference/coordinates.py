@@ -36,10 +36,7 @@ class Coordinates:
 
 @dataclass(frozen=True, eq=False)
 class Logarithms(Coordinates):
-    """The logarithms of some positive parameters, and the others themselves.
-
-    If a record determines a ratio of powers of two sizes, but hardly the sizes, their logarithms lie along a line.
-    """
+    """The logarithms of some positive parameters, and the others themselves: ratios of powers then lie along a line."""
 
     positive: Flags
 
@@ -135,11 +132,11 @@ _FLANKS: dict[str, tuple[Callable[..., tuple[Floats, ...]], Callable[..., tuple[
 class FlankCoordinates(Coordinates):
     """Slope, shape, height and slope ratio of a contour at one x, instead of its sizes, q and x_c.
 
-    A record of one flank hardly determines the vertex: sizes and vertex then lie along a bent ridge. With the slope t,
-    the coordinates are log t, for two sizes the logarithm of a shape, the height y and log(t/t′). With u = |x − x_c|,
-    for a power law t = n (u/w)^(n − 1), the shape is n − 1, y = q + t u/n and t/t′ = u/(n − 1); for an ellipse with u =
-    a sin τ, t = (b/a) tan τ, the shape is tan τ, y = q + b (1 − cos τ) and t/t′ = u cos² τ. A parabola is a power law
-    of n = 2, and a circle an ellipse of b = a, without a shape.
+    A record of one flank hardly determines the vertex: sizes and vertex then lie along a bent ridge. With u = |x − x_c|
+    and the slope t, the coordinates are log t, for two sizes the log of a shape, the height y, and log(t/t′). For a
+    power law t = n (u/w)^(n − 1), the shape is n − 1, y = q + t u/n, t/t′ = u/(n − 1); for an ellipse with u = a sin τ,
+    t = (b/a) tan τ, the shape is tan τ, y = q + b (1 − cos τ), t/t′ = u cos² τ. A parabola has n = 2, a circle b = a,
+    without a shape.
     """
 
     flank: str  # of `FLANKS`

@@ -168,10 +168,9 @@ class Mixture(_Density):
     def fitted(
         cls, points: Floats, bent: Sequence[int], parts: int, ends: Ends = ANYTHING, weights: Floats | None = None
     ) -> Mixture:
-        """Fit a mixture to points, (n, parameters), along a bent ridge, by expectation and maximisation.
+        """Fit a mixture, normal in the columns `bent`, to points, (n, parameters), by expectation and maximisation.
 
-        Its parts are normal in the columns `bent`; given these, the others are the same normal distribution everywhere,
-        with a mean that is linear in them. The weights have the sum one.
+        Given these, all others have one normal distribution, with a mean linear in them. The weights have the sum one.
         """
         weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
         mean = weights @ points
@@ -296,10 +295,9 @@ def approximate(
     deadline: Deadline = NEVER,
     ends: Ends = ANYTHING,
 ) -> Proposal:
-    """Approximate a target by rounds of adaptive importance sampling, from a guess at mean and covariance.
+    """Approximate a target by rounds of adaptive importance sampling, from guesses at mean and covariance.
 
-    The most efficient round gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin &
-    Robert 2004, doi 10.1198/106186004X12803). After the deadline there is no further round.
+    The most efficient round gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407).
     """
     best = proposal = Proposal(centre, WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
     for _ in range(_ADAPTATIONS):
@@ -336,8 +334,8 @@ def refined(
 ) -> Mixture:
     """Return a mixture of pieces that cover a bent target, if a proposal covers it poorly; else that alone.
 
-    By adaptive multiple importance sampling (Cornuet, Marin, Mira & Robert 2012, doi
-    10.1111/j.1467-9469.2011.00756.x): the draws of all rounds are weighed by the mean density of all proposals so far.
+    All draws are weighed by the mean density of all proposals so far (Cornuet et al. 2012, doi
+    10.1111/j.1467-9469.2011.00756.x).
     """
     size = proposal.mean.size
     best, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()

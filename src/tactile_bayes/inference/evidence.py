@@ -46,17 +46,13 @@ def bridge_evidence(
     *,
     proposals: int = _PROPOSALS,
 ) -> Evidence:
-    """Return the logarithm of the integral of a density, from draws (chains, n, d), walker-major, and their values.
+    """Return the logarithm of the integral Z of a density f, from draws (chains, n, d), walker-major, and their values.
 
-    With density f = Z p and draws of p and of a normalised density q like it,
-
-        Z = E_q[f h]/E_p[q h],  h = 1/(s f/Z + (1 − s) q),  s = n/(n + m),
-
-    for n effective draws of p and m of q (Meng & Wong 1996, Statistica Sinica 6, 831; Gronau et al. 2017, doi
-    10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the other, and vice versa: a
-    comparison with the fitted draws is biased (Overstall & Forster 2010, doi 10.1016/j.csda.2010.03.008). The error has
-    both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with autocorrelation; in tens of
-    dimensions it is up to a quarter too large. Neither t distributions nor Warp-III gained anything.
+    For n effective draws of f/Z and m of a density q that is fitted to the other half of the chains (a comparison with
+    the fitted draws is biased: Overstall & Forster 2010, doi 10.1016/j.csda.2010.03.008), Z = E_q[f h]/E_p[q h], h =
+    1/(s f/Z + (1 − s) q), s = n/(n + m) (Meng & Wong 1996, Statistica Sinica 6, 831). The error has both terms of
+    Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x); in tens of dimensions it is up to a quarter too
+    large. Neither t distributions nor Warp-III gained anything.
     """
     count = proposals // 2
     _refuse_few(draws)
@@ -102,7 +98,7 @@ def _fitted(points: Floats) -> _ScoreFit:
 
 
 class _ScoreFit:
-    """A normal distribution of normal scores along the columns of `axes`, (d, d), fitted to points, (n, d).
+    """A normal distribution, fitted to points, (n, d), of their normal scores along the columns of `axes`, (d, d).
 
     Scores are piecewise linear in the place along an axis, for hard bounds and skewness.
     """
@@ -164,8 +160,7 @@ class _Bridge(NamedTuple):
 def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
     """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,).
 
-    The sums of logistic functions over both are equal at the threshold log Z + log(m/n) (Bennett 1976, doi
-    10.1016/0021-9991(76)90078-4).
+    At the threshold log Z + log(m/n) both sums are equal (Bennett 1976, doi 10.1016/0021-9991(76)90078-4).
     """
     if not np.any(np.isfinite(proposed)):
         raise InferenceError(
@@ -240,10 +235,7 @@ class ContourEvidence(NamedTuple):
 
 
 def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> ContourEvidence:
-    """Return the evidence of a model by bridge sampling, with the prior restricted to contours within reach.
-
-    With priors of other widths, the evidence follows from the same draws by importance weights.
-    """
+    """Return the evidence of a model, over contours within reach; with priors of other widths by importance weights."""
     coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
     kept = sampled.draws.evenly(_POSTERIOR_DRAWS // chains)
     points = sampled.draws.samples[:, kept].reshape(-1, size)

@@ -35,8 +35,7 @@ _MAX_DISTANCE = 30.0  # of a mean beyond the edge, in standard deviations, so th
 class ContactProposal:
     """Mixture of normal densities on each branch, for each of n samples.
 
-    Shapes: mean (branches, n, k) of way, force and drive angle, if it is free; share (branches, n), 0 without an
-    approximation; ways (branches, n, 2).
+    Shapes: mean (branches, n, k) of way, force[, drive angle]; share (branches, n), maybe 0; ways (branches, n, 2).
     """
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:
@@ -204,8 +203,7 @@ def mixed(found: ContactDraws, rows: Index, log_prior: Floats, rng: np.random.Ge
 def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequence) -> ContactWeights:
     """Return proposals, from normal approximations, and their importance weights.
 
-    Where weights are not certified, kernels about the draws of most weight propose others (population Monte Carlo;
-    Cappé, Guillin, Marin & Robert 2004, doi 10.1198/106186004X12803).
+    Those not certified follow kernels about the best draws (Cappé et al. 2004, doi 10.1198/106186004X12803).
     """
     rng = np.random.default_rng(seed)
     found = _weighed(density, *ContactProposal(*_approximation(density), density.ways).draw(draws, rng))

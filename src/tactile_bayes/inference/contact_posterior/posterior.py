@@ -177,7 +177,7 @@ def infer_contacts(
 def density_of(
     measured: xr.Dataset, cell: LoadCell, friction: float, prior: ContactPrior
 ) -> tuple[ContactDensity, Index, Floats]:
-    """Return the density of the loaded samples, with their numbers and prior probabilities' logarithms.
+    """Return the density of the loaded samples, with their numbers and the logarithms of their prior probabilities.
 
     Where a sample may also stick, or slide the other way, it stands there once for each direction of the force.
     """

@@ -17,10 +17,7 @@ _LOST_BELOW = 10.0  # distance of a lost walker's largest log-probability below 
 
 
 def lost_walkers(values: Floats) -> Flags:
-    """Return True for walkers far less probable than the rest, (chain, walker), from their log-probabilities.
-
-    R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails.
-    """
+    """Return True for walkers, (chain, walker), far less probable than the rest, which R̂ would not detect."""
     if not values.shape[1]:
         return np.zeros((len(values), values.shape[2]), dtype=bool)
     return np.asarray(values.max(axis=1) < np.median(values) - _LOST_BELOW)

@@ -23,8 +23,7 @@ def step_ensembles(
 ) -> tuple[Floats, Floats]:
     """Return points, (chain, walker, parameter), and their log-density, (chain, walker), after a step of all ensembles.
 
-    Each moves by halves with its own random numbers, as if it were alone (Foreman-Mackey et al. 2013, doi
-    10.1086/670067), while the target is evaluated for all at once.
+    Each moves by halves with its own random numbers, as if alone, while the target is evaluated for all at once.
     """
     points, values = points.copy(), values.copy()
     shares = np.array([share for _, share in moves])
@@ -52,8 +51,7 @@ def step_ensembles(
 class FittedMove(emcee.moves.RedBlueMove):
     """Proposals from a distribution, Student's t by default, fitted to the half of the ensemble that does not move.
 
-    They do not depend on the moving half, so that the target stays invariant however bad the fit is. Boehl (2022), doi
-    10.2139/ssrn.4250395, adapts such proposals to the whole run instead.
+    They leave the target invariant however bad the fit is (compare Boehl 2022, doi 10.2139/ssrn.4250395).
     """
 
     def __init__(
@@ -79,10 +77,9 @@ class FittedMove(emcee.moves.RedBlueMove):
 
 
 class NormalMove(emcee.moves.RedBlueMove):
-    """Steps that leave a standard normal distribution invariant, for coordinates with nearly that distribution.
+    """Steps that leave a standard normal distribution invariant: a random share of the position and a new normal draw.
 
-    A step combines a random share of the position with a new normal draw (Neal 1999; Cotter, Roberts, Stuart & White
-    2013, doi 10.1214/13-STS421); half of the steps are new draws.
+    See Cotter, Roberts, Stuart & White 2013, doi 10.1214/13-STS421; half of the steps are new draws.
     """
 
     def __init__(self, columns: slice) -> None:
@@ -109,10 +106,7 @@ def moves_in(coordinates: Coordinates) -> Moves:
 
 
 def standard_moves(proposal: Mixture | None = None) -> Moves:
-    """Return the moves of an ensemble, with their shares.
-
-    A given proposal is used the more the more efficient it is; short differences reach what it misses.
-    """
+    """Return the moves of an ensemble, with their shares: of a proposal the more, the more efficient it is."""
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
     fixed = _MAX_FIXED_SHARE * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))

@@ -50,8 +50,7 @@ _NARROWEST, _WIDEST = 0.05, 3.0  # range of factors on standard deviations in wh
 def matched_priors(family: str, length: float) -> dict[str, Distribution]:
     """Return priors of a family's own parameters under which a flank is as curved as in all other families.
 
-    The geometric mean of its radius of curvature between slopes of 0° and 45° has its median at half the rod's length,
-    and its logarithm a standard deviation of 1.
+    The geometric mean of its radius of curvature up to 45° has the median L/2, and its logarithm a deviation of 1.
     """
     return {
         f"{side}{parameter}": prior

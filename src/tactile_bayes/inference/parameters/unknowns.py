@@ -146,10 +146,9 @@ class Unknowns:
         return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Apply memory, unknown gains, levers and zeros, and the curve, in place, to loads of all samples in a row.
+        """Apply memory, gains, levers, zeros and curve, in place, to loads, (n, ..., samples, 3) [EI/L, EI/L²].
 
-        Shapes: loads (n, ..., samples, 3) [EI/L, EI/L²]. Zeros are given as readings, and enter as the loads that the
-        cell reads as such without its own curve.
+        Zeros are given as readings, and enter as the loads that the cell reads as such without its own curve.
         """
         values = self._with_known(values)
         if self.memory:
@@ -208,7 +207,7 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
 def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Unknowns:
     """Return the parameters of a rig that are unknown and that the record shows, with their priors.
 
-    A bias that the likelihood integrates out, the noise and the discrepancy are not among them.
+    Noise, discrepancy, and a bias that the likelihood integrates out are not among them.
     """
     present = [_SHORT[name] for name in present_channels(measured)]
     rod, pivots, joint = rod_of(measured), len(bases_of(measured)), rig.calibration

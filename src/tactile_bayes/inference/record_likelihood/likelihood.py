@@ -89,12 +89,11 @@ _LENGTHS_OF_LINE = [0, 1, 3, 4]  # columns of a line that are lengths, or change
 
 
 class RecordLikelihood:
-    """Likelihood of a record as a function of contour, rig and noise.
+    """Likelihood of a record as a function of contour (in the record's unit of length), rig and noise.
 
-    Contours are in the record's unit of length, loads inside in EI/L and EI/L², forces in the record's frame. With
-    `exact`, paths are so to rounding; otherwise as the noise requires, at a fifth of the cost. Unless
-    `is_always_clear`, contours that the unloaded rod is not clear of after snap-off are excluded. Friction acts if it
-    is stated, or if the rod `rubs` on the object with that of a rig.
+    Loads inside are in EI/L and EI/L², forces in the record's frame. With `exact`, paths are so to rounding; otherwise
+    as the noise requires, at a fifth of the cost. Unless `is_always_clear`, contours that the unloaded rod is not clear
+    of after snap-off are excluded. Friction acts if it is stated, or if the rod `rubs` with that of a rig.
     """
 
     def __init__(
@@ -218,10 +217,7 @@ class RecordLikelihood:
         return self._predict(contours, rig, self.encoder.errors)[:2]
 
     def predict_with_events(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags, Floats]:
-        """Return the results of `predict`, and drive angles read at first contact and snap-off, (n, segments, 2).
-
-        They are in the sweep frame [rad]; NaN if there is no such event.
-        """
+        """Return the results of `predict`, and readings [rad] at first contact and snap-off, (n, segments, 2)."""
         loads, reached, events = self._predict(contours, rig, np.zeros(1))
         return loads[:, 0], reached, events
 

@@ -41,9 +41,8 @@ def shortened(record: xr.Dataset, cell: LoadCell, rubs: bool = False) -> tuple[x
     """Return a record as the likelihood takes it, and the load cell of its samples; `blocks` of the record states how.
 
     Of more than `MOST_SAMPLES`, blocks of readings at neighbouring drive angles are taken, two points on a straight
-    line for each; readings next to a snap-off stay single. For noise whose means are not normal (outliers, drift,
-    correlation, an uncertain encoder, coarse steps, the end of the range), for carried bases, and for drives that turn
-    back in contact if the rod `rubs`, every so many readings are.
+    line for each, single ones next to a snap-off; or every so many readings, for noise whose means are not normal (see
+    `_averages`), for carried bases, and for drives that turn back in contact if the rod `rubs`.
     """
     if not is_long(record):
         return record, cell

@@ -27,8 +27,7 @@ _LARGEST = 50.0  # bound of the change of the logarithm of a radius, far beyond 
 class Anchor:
     """The point of a contour at one slope angle, and how far it is from where a linear map of the radii has it.
 
-    The vertex is as far from an arc that was touched as the integral of the radii between them says, which is linear in
-    their logarithms only near a centre: farther away the arc moves unless the vertex does.
+    An arc that was touched stays at its distance from the vertex, linear in the log-radii near a centre only.
     """
 
     slope_angle: float
@@ -103,9 +102,8 @@ class _SmoothNoise(NamedTuple):
 class NormalApproximation:
     """Normal distribution of the linear parameters, given amplitude, length scale and noise, `scales` of the model.
 
-    It is exact if loads and snap-offs are linear in the log-radii and in the rig, with the vertex moved by `bent`, and
-    priors are normal. Loads are linearised at a point; over the length scale, the map is interpolated. Parameters that
-    may vanish, like friction, have the positive part of the distribution alone.
+    It is exact if loads and snap-offs are linear in log-radii and rig, with the vertex moved by `bent`, and priors are
+    normal. Over the length scale, the map is interpolated. What may vanish, like friction, has the positive part alone.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
@@ -185,10 +183,7 @@ class NormalApproximation:
         return upper * np.copysign(1.0, np.diagonal(upper, axis1=1, axis2=2))[..., None]
 
     def mean(self, scales: Floats) -> Floats:
-        """Return the mean of the linear parameters, shape (d,), given scales of shape (scales,).
-
-        Of parameters that may vanish it is the median.
-        """
+        """Return the mean of the linear parameters, (d,), given scales (scales,); of what may vanish the median."""
         pulled, root = self.conditional(scales[None])
         pulled += self.truncated(pulled, root, np.zeros(pulled.shape))[0]
         return np.asarray(solve_triangular(root[0].T, pulled[0]))

@@ -40,9 +40,9 @@ class Observer:
         self._width = self._within / np.sqrt(3.0)
 
     def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, Flags, Floats]:
-        """Return residuals of readings over `noise`, samples loaded as measured, and residuals of snap-offs.
+        """Return residuals (expected less measured) over `noise`, samples loaded alike, and residuals of snap-offs.
 
-        They are expected less measured; shapes (n, samples, 3), (n, samples) and (n, sweep segments that end).
+        Shapes (n, samples, 3), (n, samples) and (n, sweep segments that end).
         """
         model, rig = self.model, self.model.unknowns.rig(values)
         loads, _, events = model.likelihood.predict_with_events(contours, rig)
@@ -94,8 +94,7 @@ class Observations(NamedTuple):
 def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> Observations:
     """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
 
-    Differences along the parameters give rough slopes, and steps of about a deviation along their singular vectors
-    better ones.
+    Differences along the parameters give rough slopes, and steps along their singular vectors better ones.
     """
     model = observer.model
     family = model.family

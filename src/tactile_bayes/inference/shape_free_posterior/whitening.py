@@ -29,10 +29,9 @@ _DRAWS = 4000  # number of draws from a prior for its mean and standard deviatio
 
 @dataclass(frozen=True, eq=False)
 class Whitening(Coordinates):
-    """A change of variables by a normal approximation, whose quality affects efficiency, not exactness.
+    """Logarithms of the scales, and all else standardised by the mean and covariance of a normal approximation there.
 
-    The coordinates are the logarithms of the scales, and the other parameters, standardised by the mean and covariance
-    that the approximation gives at these scales; of those that may vanish by the positive part of that distribution.
+    Of what may vanish, by the positive part of that distribution. The fit affects efficiency, not exactness.
     """
 
     approximation: NormalApproximation
@@ -130,9 +129,9 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
 
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:
-    """Return the most probable scales near the given ones.
+    """Return the most probable scales near the given ones, with white noise of half the scatter at least.
 
-    White noise is at least half the scatter: less would stop a search far from the mode at the first bend of its ridge.
+    Less would stop a search far from the mode at the first bend of its ridge.
     """
     names = scale_names(model)
     columns = [model.names.index(name) for name in names]

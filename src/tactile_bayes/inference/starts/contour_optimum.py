@@ -159,8 +159,8 @@ class FirstOrder(NamedTuple):
 def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence[Sequence[str]]) -> list[FirstOrder]:
     """Return what each group of added parameters explains beside a start, the optimum of the model without them.
 
-    With the score s of a group, and its information S, less what the other parameters explain, both in prior standard
-    deviations, it is ½ (sᵀ S⁻¹ s − log det S) by Laplace's approximation (Rao's score test, and its price).
+    It is ½ (sᵀ S⁻¹ s − log det S), Laplace's approximation, of the score s of a group and its information S, less what
+    the others explain, both in prior standard deviations (Rao's score test, and its price).
     """
     search, names = _Search(model, _prior_quantiles(model), NEVER), model.forward_parameters
     place = search.coordinates.of(search.named(start)[None])[0] / search.spread
@@ -418,9 +418,9 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
 
 
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
-    """Return the contour parameters fitted to Step 2's contacts with a rig, None if few are usable.
+    """Return the contour parameters fitted to Step 2's contacts with a rig; None if few are usable, or it is far off.
 
-    The rig's default has the zeros of the unloaded samples; None stands also for a rig that is far from the stated one.
+    The rig's default has the zeros of the unloaded samples.
     """
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None

@@ -205,7 +205,7 @@ def _residuals(model: ContourModel, point: Floats) -> Floats:
 
 
 def mean_square_left(model: ContourModel, point: Floats) -> float:
-    """Return the mean square of the residuals at a point, over a coarse noise of the record, with outliers clipped.
+    """Return the mean square of the residuals at a point over a coarse noise, with outliers clipped.
 
     Beside a discrepancy they are those of each sample given the ones before it.
     """

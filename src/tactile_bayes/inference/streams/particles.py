@@ -84,9 +84,8 @@ _MOST_STAGES = 200  # of an update
 class Particles:
     """Weighted particles of the record so far, from those of the record before, or from the prior (None).
 
-    `log_integral` is that of prior times likelihood over contours within reach; `log_ratios` are predictive densities
-    of the new samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in
-    `Stream.update`.
+    `log_integral` is that of prior times likelihood within reach; `log_ratios` are predictive densities of the new
+    samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in `Stream.update`.
     """
 
     def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:

@@ -1,4 +1,4 @@
-"""The state of a stream, its growing record, its e-value, and the file from which a stream resumes after it was killed at any moment."""
+"""The state of a stream: its growing record, its e-value, and the file from which it resumes."""
 
 from __future__ import annotations
 
