@@ -7,9 +7,18 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL, SOUND, infer_as_stated, measured, posterior, swept
+from helpers.refusals import refused
+from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
+from tactile_bayes.assessment.sampling_error import sampling_error
+from tactile_bayes.assessment.split_prediction import parts_of, split_prediction
 from tactile_bayes.assessment.trust import _corrected, draws_digest, trust
+from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.experiment import Experiment, experiment_of
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import write_result
+from tactile_bayes.rig import NOTHING, Rig
 
 
 @cache
@@ -136,3 +145,127 @@ def test_a_distribution_that_is_none_of_scipys_has_to_be_given_again():
     with pytest.raises(ParameterError, match="does not state its family"):
         trust(tree, rng=1, replicates=0, assumptions=False)
     assert trust(tree, rng=1, family=family, replicates=0, assumptions=False).attrs["conclusion"] == "holds"
+
+
+REGIONS = {"in_gap": np.linspace(-0.05, 0.05, 3), "beside": np.array([-0.4, 0.4])}
+
+
+def test_a_record_sets_the_parabola_and_its_band():
+    model = experiment_of(posterior()).model
+    found = prior_sensitivity(posterior(), model, REGIONS)
+    assert found["quantity"].values.tolist() == [*model.names, "band in_gap", "band beside"]
+    assert set(found["set_by"].values) == {"record"}
+    assert (found["sensitivity"].sel(component="likelihood") > 0.05).all()
+
+
+def test_a_prior_as_narrow_as_the_record_is_named_beside_it():
+    deviation = float(posterior()["posterior"]["q"].std())
+    family = Family("parabola", q=stats.norm(0.5, 0.3 * deviation))
+    strong = infer_as_stated(measured(), load_cell=CELL, family=family, rng=1, settings=SOUND)
+    model = experiment_of(strong).model
+    found = prior_sensitivity(strong, model, REGIONS)["sensitivity"]
+    assert float(found.sel(quantity="q", component="contour")) > 0.05
+    assert float(found.sel(quantity="q", component="contour")) > float(found.sel(quantity="q", component="likelihood"))
+    assert float(found.sel(quantity="a", component="rig")) < 0.05
+
+
+def flat(q, x_c=0.0, family="parabola"):
+    values = {"a": np.full_like(q, 0.5), "q": q, "x_c": np.full_like(q, x_c)}
+    tree = xr.DataTree.from_dict({"posterior": xr.Dataset({k: (("chain", "draw"), v) for k, v in values.items()})})
+    tree.attrs = {"family": family, "units": "dimensionless"}
+    return tree
+
+
+def test_error_of_independent_normal_draws_is_that_of_order_statistics():
+    """The standard error of a quantile is √(p(1 − p)/n)/density; an estimate scatters by a fifth, their mean by 4 %."""
+    rng = np.random.default_rng(3)
+    found = [sampling_error(flat(rng.normal(size=(4, 1000))), [0.0], 0.9) for _ in range(30)]
+    level = stats.norm.ppf(0.05)
+    exact = np.sqrt(0.05 * 0.95 / 4000) / stats.norm.pdf(level)
+    assert np.mean([float(each.lower_error[0]) for each in found]) == pytest.approx(exact, rel=0.16)
+    assert np.mean([float(each.upper_error[0]) for each in found]) == pytest.approx(exact, rel=0.16)
+    larger = [float(max(each.lower_error[0], each.upper_error[0])) / (-2.0 * level) for each in found]
+    assert [float(each.share[0]) for each in found] == pytest.approx(larger, rel=0.1)  # the band's width to some 2 %
+
+
+def test_walkers_that_repeat_themselves_need_more_draws():
+    rng = np.random.default_rng(4)
+    independent = rng.normal(size=(4, 1000))
+    repeated = np.repeat(rng.normal(size=(4, 50)), 20, axis=1)
+    few, many = (sampling_error(flat(q), [0.0]) for q in (repeated, independent))
+    assert float(few.share[0]) > 2.0 * float(many.share[0])  # √20 on the mean, each to a quarter
+    assert int(few.draws_needed) > 4 * int(many.draws_needed)
+    assert float(few.effective_draws) < 0.3 * float(many.effective_draws)
+
+
+def test_draws_needed_follow_from_the_square_of_the_share():
+    found = sampling_error(flat(np.random.default_rng(5).normal(size=(2, 30))), [0.0])
+    assert int(found.draws_needed) == int(np.ceil(60 * (float(found.share.max()) / 0.1) ** 2))
+
+
+def test_where_contours_end_there_is_no_error():
+    r = np.random.default_rng(6).uniform(0.5, 0.6, (4, 50))
+    tree = flat(np.full_like(r, 0.3))
+    tree["posterior"] = tree["posterior"].to_dataset().rename(a="r").assign(r=(("chain", "draw"), r))
+    tree.attrs["family"] = "circle"
+    found = sampling_error(tree, [0.0, 0.55])
+    assert np.isfinite(found.lower_error[0])
+    assert np.isnan(found.lower_error[1])
+    with pytest.raises(InferenceError, match="no grid point"):
+        sampling_error(tree, [2.0])
+
+
+def found_of(tree):
+    return split_prediction(tree, experiment_of(tree).model)
+
+
+def test_parts_of_a_record_of_the_model_agree():
+    found = found_of(posterior())
+    assert found.attrs["passed"] == 1  # a false alarm has a probability of 1 %; the seed is fixed
+    assert found["part"].values.tolist() == ["sweep 1", "sweep 2", "earlier half", "later half", "noise"]
+    assert (np.abs(found["moves"].values[:-1]) < 4.0).all()
+
+
+@pytest.mark.slow
+def test_friction_shows_as_a_disagreement_of_early_and_late_contacts():
+    record = CELL.measure(swept(Parabola(0.5, 0.5), friction=0.007), rng=3)
+    found = found_of(infer_as_stated(record, load_cell=CELL, rng=1, settings=SOUND))
+    assert found.attrs["passed"] == 0
+    assert float(found["sd"].sel(part="earlier half")) > 5.0
+
+
+@pytest.mark.slow
+def test_a_zero_that_moves_between_sweeps_shows_though_zeros_are_not_inferred():
+    record = measured().copy(deep=True)
+    course = np.linspace(-1.0, 1.0, record.sizes["sample"])
+    record["force_x"] = record.force_x + xr.DataArray(0.05 * course, dims="sample")
+    assert found_of(infer_as_stated(record, load_cell=CELL, rng=1, settings=SOUND)).attrs["passed"] == 0
+
+
+@pytest.mark.slow
+def test_noise_that_is_known_and_larger_than_stated_shows():
+    louder = type(CELL)(force_noise=1.25 * CELL.force_noise, moment_noise=1.25 * CELL.moment_noise)
+    record = louder.measure(swept(Parabola(0.5, 0.5)), rng=4)
+    rig = Rig(load_cell=CELL, unknown={**NOTHING, "noise_scale": 1.0})
+    found = found_of(infer_contour(record, rig=rig, rng=1, settings=SOUND))
+    assert found.attrs["passed"] == 0
+    assert float(found["sd"].sel(part="noise")) > 4.0
+
+
+def test_parts_are_sweeps_pivots_and_halves():
+    record = swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.0)), step=0.1)
+    rig = Rig(load_cell=CELL, unknown="nothing")
+    parts = parts_of(Experiment(record, rig=rig).model)
+    sweeps = [f"sweep {number}" for number in (1, 2, 3, 4)]
+    assert list(parts) == [*sweeps, "pivot 1", "pivot 2", "earlier half", "later half"]
+    assert (parts["pivot 1"] == (record.base_x.values == 0.0)).all()
+    assert (parts["earlier half"] == ~parts["later half"]).all()
+    one = record.isel(sample=record.sweep.values == record.sweep.values[0])
+    assert list(parts_of(Experiment(one, rig=rig).model)) == ["earlier half", "later half"]
+
+
+def test_too_few_predictions_are_refused():
+    tree = posterior().copy()
+    tree["posterior_predictive"] = tree["posterior_predictive"].to_dataset().isel(draw=slice(0, 10))
+    with refused(InferenceError, "20 predictions"):
+        found_of(tree)

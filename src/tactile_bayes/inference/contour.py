@@ -242,7 +242,7 @@ def sampled(
             # A run that resumes from a checkpoint must start at the same points, whatever the time limit was.
             problem, walk = _likeliest(problem, seeds[0], settings, NEVER if checkpoint is not None else deadline)
         model = problem.model
-        _refuse_beyond(model, walk)
+        refuse_beyond(model, walk)
         is_brief = walk.is_hopeless and settings.max_steps is None
         steps = _STEPS_OF_A_VERDICT if is_brief else settings.max_steps
         draws = sample(
@@ -273,14 +273,7 @@ def sampled(
     return Sampled(whole, draws, walk.coordinates)
 
 
-def started(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Walk:
-    """Return the start of walkers in the posterior of a model."""
-    walk = walk_of(model, seed, settings)
-    _refuse_beyond(model, walk)
-    return walk
-
-
-def _refuse_beyond(model: ContourModel, walk: Walk) -> None:
+def refuse_beyond(model: ContourModel, walk: Walk) -> None:
     """Refuse a start whose parameters fit the record far better beyond the ends of their priors."""
     if walk.beyond:
         raise InferenceError(

@@ -11,7 +11,6 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, only, swept, without
 from helpers.refusals import refused
-from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Parabola, from_function
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import calibrate_rig, infer_contour
@@ -212,19 +211,6 @@ def test_a_stored_posterior_has_the_same_prior():
     points = np.array([[0.7, 0.45, 0.0, *TRUE.values(), 1.0]])
     given = Experiment(read(OBJECT, 2), rig()).model
     np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_families_are_compared_with_the_rig():
-    """One parameter has no correlations: its prior given by hand has the same evidence, up to the error of bridges."""
-    record, alone = read(OBJECT, 2), rig_prior(drawn(("rigidity_scale",)))
-    known = {"families": ["parabola", "circle"], "leave_one_out": False, "rng": 1}
-    stated = Rig(load_cell=CELL, unknown=only(**alone.priors))
-    with_rig = compare_families(record, rig=calibrated(alone), settings=SOUND, **known)
-    by_hand = compare_families(record, rig=stated, settings=SOUND, **known)
-    assert with_rig.attrs["most_probable"] == "parabola"
-    evidences = (one["log_evidence"].sel(family="parabola") for one in (with_rig, by_hand))
-    assert abs(float(next(evidences) - next(evidences))) < 0.2
 
 
 def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept():

@@ -37,18 +37,9 @@ class Diagnosis:
         laid_out = walker_major(samples)
         self.ess_bulk = _each(array_stats.ess, laid_out, method="bulk")
         self.ess_tail = _each(array_stats.ess, laid_out, method="tail", prob=_TAIL)
-
-    @property
-    def worst_r_hat(self) -> int:
-        return int(np.argmax(np.where(np.isnan(self.r_hat), np.inf, self.r_hat)))
-
-    @property
-    def worst_ess(self) -> int:
-        return int(np.argmin(np.nan_to_num(self.ess)))
-
-    @property
-    def ess(self) -> Floats:
-        return np.minimum(self.ess_bulk, self.ess_tail)
+        self.ess = np.minimum(self.ess_bulk, self.ess_tail)
+        self.worst_r_hat = int(np.argmax(np.where(np.isnan(self.r_hat), np.inf, self.r_hat)))  # number of a parameter
+        self.worst_ess = int(np.argmin(np.nan_to_num(self.ess)))
 
     def satisfies(self, max_r_hat: float, min_ess: float) -> bool:
         return bool(np.all(self.r_hat < max_r_hat) and np.all(self.ess >= min_ess))

@@ -19,11 +19,7 @@ RandomState = tuple[Any, ...]  # of NumPy's Mersenne Twister, which emcee's move
 
 
 def first_random_state(seed: np.random.SeedSequence) -> RandomState:
-    return state_of(np.random.RandomState(np.random.MT19937(seed)))
-
-
-def state_of(random: np.random.RandomState) -> RandomState:
-    return tuple(random.get_state(legacy=True))
+    return tuple(np.random.RandomState(np.random.MT19937(seed)).get_state())
 
 
 def generator_at(state: RandomState) -> np.random.RandomState:

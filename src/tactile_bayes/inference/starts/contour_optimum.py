@@ -14,6 +14,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.least_squares import HUBER_THRESHOLD, STEP, Optimum, descend, optima
+from tactile_bayes.inference.misfit import is_inferred
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
@@ -171,7 +172,7 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
         return central_slopes(lambda points: search.residuals(points * search.spread), place, steps)
 
     slopes = slopes_over(STEP)
-    for i in [i for i, name in enumerate(names) if name in loose and name.removesuffix("_seconds").endswith("lag")]:
+    for i in [i for i, name in enumerate(names) if name in loose and is_inferred("lag", [name])]:
         there = place + np.eye(place.size)[i]  # the derivative by a lag vanishes where it does
         slopes[:, i] = search.residuals((there * search.spread)[None])[0] - residuals
     # Where a parameter is as stated, another solution of the rod may take over, a little off, as if all loads jumped.
@@ -193,16 +194,12 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
             which = [i for i in which if i not in wrong]
         alone = np.linalg.solve(precision[np.ix_(own, own)], score[own])
         gain = 0.5 * (score[both] @ step - score[own] @ alone)
-        price = 0.5 * (_log_det(precision[np.ix_(both, both)]) - _log_det(precision[np.ix_(own, own)]))
+        of_both, of_own = (np.linalg.slogdet(precision[np.ix_(some, some)]).logabsdet for some in (both, own))
         moved = place.copy()
         moved[both] += np.clip(step, -_FARTHEST, _FARTHEST)
         point = search.points((moved * search.spread)[None])[0]
-        found.append(FirstOrder(float(gain - price), dict(zip(names, point.tolist(), strict=True))))
+        found.append(FirstOrder(float(gain - 0.5 * (of_both - of_own)), dict(zip(names, point.tolist(), strict=True))))
     return found
-
-
-def _log_det(matrix: Floats) -> float:
-    return float(np.linalg.slogdet(matrix).logabsdet)
 
 
 def _prior_quantiles(model: ContourModel) -> Floats:
