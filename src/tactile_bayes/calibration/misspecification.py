@@ -10,7 +10,7 @@ from tactile_bayes.checks import check_numbers, check_optional
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.rig.rig import Rig
 
 _SPOT = 0.1  # standard deviation of a flat spot in slope angle [rad]

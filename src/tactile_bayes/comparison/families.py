@@ -22,7 +22,7 @@ from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
-from tactile_bayes.inference.evidence import WIDTHS, ContourEvidence, contour_evidence
+from tactile_bayes.inference.evidence import WIDTHS, Evidence, contour_evidence
 from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.priors import matched_priors
@@ -53,7 +53,7 @@ class _Tried(NamedTuple):
 
     ceiling: float  # largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed
     draws: Draws | None = None
-    evidence: ContourEvidence | None = None  # None also where it cannot be computed from the draws
+    evidence: Evidence | None = None  # None also where it cannot be computed from the draws
     predicted: LeftOut | None = None
     p_value: float = np.nan
     passed: bool = False

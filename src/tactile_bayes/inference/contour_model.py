@@ -19,9 +19,8 @@ from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import Ends
 from tactile_bayes.inference.parameters.noise import Noise
-from tactile_bayes.inference.parameters.unknowns import Unknowns
+from tactile_bayes.inference.parameters.unknowns import RigValues, Unknowns
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.numerics.blocks import blocks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from arviz_stats.base.array import array_stats
@@ -31,7 +31,7 @@ _ROUNDS = 2  # for the effective number of draws, which hardly depends on the th
 class Evidence(NamedTuple):
     """The logarithm of an integral, with its standard error and overlap."""
 
-    log_evidence: float
+    log_evidence: Any  # a number, or, of a contour, an array with one for each of `WIDTHS`
     standard_error: float  # of `log_evidence`
     # ∫ p q/(s p + (1 − s) q) of the density p and the proposal density q, both normalised, with s the share of draws of
     # p: 1 if both are the same, 0 if they are disjoint. Below some 0.1, the standard error is not reliable.
@@ -176,7 +176,8 @@ def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
             raise InferenceError(
                 "density and fit do not overlap: few points dominate it; do all chains sample the same place?"
             )
-        used, effective = effective, _effective_size(from_draws)
+        ess: float = array_stats.ess(from_draws, chain_axis=0, draw_axis=1, method="mean")
+        used, effective = effective, float(min(ess, drawn.size))
     return _Bridge(
         threshold + float(np.log(used / proposed.size)),
         threshold,
@@ -195,12 +196,6 @@ def _threshold(drawn: Floats, proposed: Floats, effective: float) -> float:
     finite = np.append(drawn, proposed[np.isfinite(proposed)])
     margin = 5.0 + np.log(drawn.size) + np.log(proposed.size)
     return float(brentq(difference, finite.min() - margin, finite.max() + margin, maxiter=1000))
-
-
-def _effective_size(terms: Floats) -> float:
-    """Return the effective sample size of terms, shape (chains, n), from their autocorrelation."""
-    ess: Callable[..., float] = array_stats.ess
-    return float(min(ess(terms, chain_axis=0, draw_axis=1, method="mean"), terms.size))
 
 
 def _correlation(both: tuple[Floats, Floats], halves: tuple[slice, slice]) -> float:
@@ -226,15 +221,7 @@ _POSTERIOR_DRAWS = 8000  # that are used, evenly spread, since neighbours add li
 _PRIOR_DRAWS, _OTHER_DRAWS = 4000, 1000  # for the share within reach, with the prior and with one of another width
 
 
-class ContourEvidence(NamedTuple):
-    """Evidence of one family."""
-
-    log_evidence: Floats  # for each of `WIDTHS`, (3,)
-    standard_error: float
-    overlap: float  # as of `Evidence`
-
-
-def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> ContourEvidence:
+def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> Evidence:
     """Return the evidence of a model, over contours within reach; with priors of other widths by importance weights."""
     coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
     kept = sampled.draws.evenly(_POSTERIOR_DRAWS // chains)
@@ -260,4 +247,4 @@ def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Gener
         share = reached if width == 1.0 else share
         logs.append(bridge.log_evidence + weighed(change)[1] - np.log(reached))
     error = np.hypot(bridge.standard_error, np.sqrt((1.0 - share) / (share * _PRIOR_DRAWS)))
-    return ContourEvidence(np.array(logs), float(error), bridge.overlap)
+    return Evidence(np.array(logs), float(error), bridge.overlap)

@@ -13,8 +13,8 @@ from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Contour, Parabola, PowerLaw
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood, events_of
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.rods.rod import Rod

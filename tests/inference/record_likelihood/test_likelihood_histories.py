@@ -9,8 +9,8 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.rig import Rig
 

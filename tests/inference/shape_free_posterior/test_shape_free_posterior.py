@@ -13,9 +13,8 @@ from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.shape_free_posterior.columns import linear_names
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import Anchor
-from tactile_bayes.inference.shape_free_posterior.observations import Observer
+from tactile_bayes.inference.shape_free_posterior.observations import Observer, linear_names
 from tactile_bayes.inference.shape_free_posterior.whitening import _linear_prior, whitening_at
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
 from tactile_bayes.load_cell import LoadCell

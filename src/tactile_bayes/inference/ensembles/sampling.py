@@ -119,7 +119,7 @@ def sample(
         target = CheckedTarget(log_probability, names)
         run = _Run(target, coordinates or Coordinates(), settings, stored, progress, began)
         run.begin(points, seed)
-        while not run.has_ended:
+        while not run.ending or run.diagnosis is None:
             try:
                 run.advance()
                 run.diagnose()
@@ -157,10 +157,6 @@ class _Run:
     @property
     def seconds(self) -> float:
         return time.monotonic() - self.began
-
-    @property
-    def has_ended(self) -> bool:
-        return bool(self.ending) and self.diagnosis is not None
 
     def begin(self, points: Floats, seed: Seed) -> None:
         """Begin at starting points, or at the stored state."""

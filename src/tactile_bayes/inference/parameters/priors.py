@@ -52,11 +52,12 @@ def matched_priors(family: str, length: float) -> dict[str, Distribution]:
 
     The geometric mean of its radius of curvature up to 45° has the median L/2, and its logarithm a deviation of 1.
     """
-    return {
-        f"{side}{parameter}": prior
-        for side, name in sides_of(family_named(family).name).items()
-        for parameter, prior in _of_flank(name, length).items()
-    }
+    found: dict[str, Distribution] = {}
+    for side, name in sides_of(family_named(family).name).items():
+        (stretch, width), powers = _matching(name), family_named(name).length_powers
+        for n, prior in own_priors(family_named(name), length).items():
+            found[f"{side}{n}"] = _log_normal(prior, width, stretch ** powers[n]) if powers[n] else prior
+    return found
 
 
 def mean_log_radius(contours: Contour) -> Floats:
@@ -68,16 +69,6 @@ def widened(priors: Mapping[str, Distribution], factor: float) -> dict[str, Dist
     """Return priors whose log-normal ones have the same median and a standard deviation multiplied by a factor."""
     kinds = {name: getattr(getattr(prior, "dist", None), "name", "") for name, prior in priors.items()}
     return {n: _log_normal(prior, factor) if kinds[n] == "lognorm" else prior for n, prior in priors.items()}
-
-
-def _of_flank(name: str, length: float) -> dict[str, Distribution]:
-    family = family_named(name)
-    priors = own_priors(family, length)
-    stretch, width = _matching(name)
-    return {
-        n: _log_normal(prior, width, stretch ** family.length_powers[n]) if family.length_powers[n] else prior
-        for n, prior in priors.items()
-    }
 
 
 @functools.cache

@@ -69,17 +69,12 @@ def refuse_other_rig(rig: RigPrior, own: Mapping[str, Any]) -> None:
         return
     for name in sorted({*rig.stated, *(str(name) for name in own if _is_stated(str(name)))}):
         stated, here = rig.stated.get(name, "nothing"), own.get(name, "nothing")
-        if not _same(stated, here):
+        is_text = isinstance(stated, str) or isinstance(here, str)
+        if stated != here if is_text else not np.allclose(stated, here, rtol=1e-9, atol=0.0):
             raise ParameterError(
                 f"the rig does not match: its {name} is {stated}, that of the record is {here}; its parameters are "
                 "deviations from what is stated, so state the same in both"
             )
-
-
-def _same(one: Any, other: Any) -> bool:
-    if isinstance(one, str) or isinstance(other, str):
-        return bool(one == other)
-    return bool(np.allclose(one, other, rtol=1e-9, atol=0.0))
 
 
 def _error(scores: Floats, correlation: Floats) -> float:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtr
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
@@ -29,11 +29,6 @@ from tactile_bayes.record import CHANNELS, frame_of, loads_of, rod_of, to_dimens
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.poses.forward_table import Tables
-
-
-from scipy.special import ndtr
-
-from tactile_bayes.arrays import Index
 
 _WIDEST, _NARROWEST = 0.75, 0.1  # distance between neighbouring errors, in standard deviations, at most and at least
 _REACH = 3.75  # largest error that is taken into account, in standard deviations
@@ -302,15 +297,6 @@ class RecordLikelihood:
         """Return the log-likelihood of each contour, shape (n,), or of each sample, (n, samples); −inf out of reach."""
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
-    def _within_blocks(self, measured: Floats, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:
-        """Return the log-density of readings within their blocks, for loads of shape (n, samples, 3)."""
-        assert self.blocks is not None
-        assert isinstance(self.load_cell, AveragedCell)
-        of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted))
-        deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
-        present = np.asarray(~np.isnan(measured).all(axis=0))
-        return self.blocks.log_density_within(deviation, present, pointwise=pointwise)
-
     def score(
         self,
         predicted: Floats,
@@ -340,7 +326,11 @@ class RecordLikelihood:
             values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)
             values = values if pointwise else values.sum(axis=-1)
         if self.blocks is not None:
-            values = values + self._within_blocks(measured, predicted[:, 0], scale, pointwise)
+            assert isinstance(self.load_cell, AveragedCell)
+            of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted[:, 0]))
+            deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
+            present = np.asarray(~np.isnan(measured).all(axis=0))
+            values = values + self.blocks.log_density_within(deviation, present, pointwise=pointwise)
         values[~reached] = -np.inf
         if np.any(np.isnan(values)):
             raise ParameterError(

@@ -47,12 +47,13 @@ class RecordSegments:
         self.bases = kinds[:, :2]  # pivots, or where drives begin [length], shape (segments, 2)
         self.backward = kinds[:, 2] > 0.0  # True for contact on the side of a backward sweep
         self.signs = np.where(self.backward, -1.0, 1.0)
+        self.signs_of_samples: Floats = self.signs[which]
         # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 where it has a history.
         self.senses = kinds[:, 3]
         self.angles_in_sweep_frame = np.where(self.backward[which], np.pi - angle, angle)
         # Change of the travel with the reading of the encoder, shape (samples,): 0 if the drive carries the base, which
         # turns no encoder.
-        self.pace = self.signs[which].copy()
+        self.pace = self.signs_of_samples.copy()
         self._samples_by_errors: dict[bytes, Segments] = {}
         self._ways: dict[int, tuple[Floats, Floats]] = {}
         # Lines of all drives, (segments, lines, LINE_COLUMNS), NaN after the last; None if none has a history.
@@ -129,11 +130,6 @@ class RecordSegments:
         """Return the drive angles of `event_samples` in the sweep frame [rad]; NaN if there is none."""
         samples = self.event_samples(loaded)
         return np.where(samples >= 0, self.angles_in_sweep_frame[samples], np.nan)
-
-    @property
-    def signs_of_samples(self) -> Floats:
-        """`signs` of the segments of samples, shape (samples,)."""
-        return np.asarray(self.signs[self.of_sample])
 
     @cached_property
     def course(self) -> Course:

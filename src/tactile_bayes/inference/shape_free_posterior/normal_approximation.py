@@ -14,8 +14,14 @@ from scipy.special import log_ndtr, ndtri_exp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
-from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, white_scales
-from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, Observer, linearised
+from tactile_bayes.inference.shape_free_posterior.observations import (
+    LinearPrior,
+    Observer,
+    joined,
+    linear_names,
+    linearised,
+    white_scales,
+)
 from tactile_bayes.numerics import chebyshev
 
 _NODE, _WEIGHT = np.polynomial.legendre.leggauss(24)  # of the quadrature between vertex and anchor

@@ -13,9 +13,16 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, logarithms, scale_names, split
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
-from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, Observer
+from tactile_bayes.inference.shape_free_posterior.observations import (
+    LinearPrior,
+    Observer,
+    joined,
+    linear_names,
+    logarithms,
+    scale_names,
+    split,
+)
 
 _FAR = 4.0  # largest distance of the logarithm of a scale from its starting value; the density is zero beyond
 _LARGEST = 50.0  # bound of the logarithm of a radius, far beyond any prior

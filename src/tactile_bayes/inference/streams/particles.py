@@ -103,7 +103,9 @@ class Particles:
         else:
             self._before = old.experiment.model
             self._added = [name for name in model.names if name not in self._before.names]
-            self.points = self._extended(old, random)
+            columns = dict(zip(self._before.names, old.points.T, strict=True))
+            columns |= {name: model.priors[name].rvs(count, random_state=random) for name in self._added}
+            self.points = np.stack([columns[name] for name in model.names], axis=1)
             self.log_weights, self.log_integral = old.log_weights, old.log_integral
         self._coordinates = model.coordinates
         self._is_continued = _is_continued(self._before, model)
@@ -112,17 +114,6 @@ class Particles:
         expected = logsumexp(self.log_weights[:, None] + wider, axis=0) + self.log_integral
         self._run()
         self.log_ratios = np.asarray(expected - self.log_integral)
-
-    def _extended(self, old: StreamState, random: np.random.Generator) -> Floats:
-        """Return the particles with new parameters drawn from their priors."""
-        names, count = old.experiment.model.names, len(old.points)
-        columns = [
-            old.points[:, names.index(name)]
-            if name in names
-            else self.model.priors[name].rvs(count, random_state=random)
-            for name in self.model.names
-        ]
-        return np.stack(columns, axis=1)
 
     def _with_wider_noise(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the log-density of points, (n,), and that of new samples with wider noise, (n, factors).

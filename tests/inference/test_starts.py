@@ -1,14 +1,21 @@
-"""The distribution of starting points, for targets that are known, and pilot runs."""
+"""Where searches lead and walkers start, for targets that are known and records that say little; pilot runs."""
 
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.contour_posteriors import CELL
+from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.starts.cloud import gather
-from tactile_bayes.inference.starts.contour_start import standardise
+from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of, smooth_optimum
+from tactile_bayes.inference.starts.contour_start import mean_square_left, standardise
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.sweep import scan
 
 PASSED = Deadline.after(0.0)
 CENTRE = np.array([1.0, 2.0])
@@ -136,3 +143,70 @@ def test_starting_points_stay_where_they_are():
     """Other coordinates name the same parameters."""
     _, before, after = _found(np.full(_SIZE, 0.5), 2.0 * np.eye(_SIZE), spread=2.0)
     np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-12)
+
+
+TRUTH = {"a": 1.484, "q": 0.686, "x_c": -0.8774, "friction": 0.45}
+
+
+@pytest.fixture(scope="module")
+def brief():
+    """Exact sweeps in which contact lasts for two samples each, and the model of a record of them."""
+    angles = np.radians(np.arange(-30.0, 211.0, 2.0))
+    contour = Parabola(TRUTH["a"], TRUTH["q"], TRUTH["x_c"])
+    scanned = scan(contour, drive_angles=angles, rig=Rig(unknown={"friction": TRUTH["friction"]}))
+    touched = (scanned.record.holding_moment != 0.0).groupby(scanned.record.sweep).sum()
+    assert touched.values.tolist() == [2, 2]
+    return scanned, contour_problem(Experiment(CELL.measure(scanned.record, rng=3), Rig(load_cell=CELL))).model
+
+
+def test_contact_of_a_few_samples_brackets_its_events(brief):
+    scanned, model = brief
+    assert not model.found["contact"].any()
+    brackets = event_brackets(model)
+    sweeps = scanned.events
+    forward, backward = ([s.first_contact.drive_angle, s.snap_off.drive_angle] for s in sweeps.values())
+    events = np.array([[forward, np.pi - np.array(backward)]])
+    assert brackets.segment.tolist() == [0, 0, 1, 1]
+    assert np.all(brackets.missed(events) == 0.0)
+
+
+@pytest.mark.slow
+def test_searches_find_what_explains_contact_of_a_few_samples(brief):
+    _, model = brief
+    usual = {"rigidity_scale": 1.0, "noise_scale": 1.0}
+    truth = np.array([[TRUTH.get(name, usual.get(name, 0.0)) for name in model.names]])
+    found = np.concatenate([one.point[None] for one in islice(optima_of(model, np.random.default_rng(1)), 6)])
+    assert model.log_probability(found).max() > model.log_probability(truth)[0] - 5.0
+
+
+def test_a_rig_that_corrects_the_record_to_none_fits_no_contour(brief):
+    """As a search may try, from a prior draw that is far out."""
+    _, model = brief
+    assert contact_fit(model, {"drive_angle_offset": -9.0}) is None
+
+
+@pytest.mark.slow
+def test_a_moment_alone_is_enough_for_a_circle():
+    """Without forces there are no contact points, and draws of a rough prior are far from all records."""
+    measured = CELL.measure(scan(Circle(0.3, q=0.5), drive_step=0.05).record, rng=1)
+    measured = measured.assign({name: np.nan * measured[name] for name in ("force_x", "force_y")})
+    model = contour_problem(Experiment(measured, Rig(load_cell=CELL, unknown="nothing"), "shape-free")).model
+    found = smooth_optimum(model, np.random.default_rng(1))
+    values = dict(zip(model.names, found, strict=True))
+    assert values["z_1"] == 0.0
+    assert values["r"] == pytest.approx(0.3, rel=0.2)
+    assert mean_square_left(model, found) < 2.0
+
+
+def test_what_a_discrepancy_describes_is_no_misfit():
+    smooth = {"discrepancy_scale": stats.lognorm(s=1e-9, scale=0.05), "discrepancy_length": stats.lognorm(s=0.1)}
+    left = []
+    measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.05).record, rng=1)
+    measured["holding_moment"] += 0.02 * (measured.holding_moment != 0.0)
+    for unknown in ({}, smooth):
+        rig = Rig(load_cell=CELL, unknown={**NOTHING, **unknown})
+        model = contour_problem(Experiment(measured, rig)).model
+        values = {"a": 0.5, "q": 0.5, "noise_scale": 1.0, "discrepancy_scale": 0.05, "discrepancy_length": 1.0}
+        left.append(mean_square_left(model, np.array([values.get(name, 0.0) for name in model.names])))
+    assert left[1] < 2.0
+    assert left[1] < left[0]
