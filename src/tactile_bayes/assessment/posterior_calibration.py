@@ -114,10 +114,8 @@ def posterior_calibration(
     workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Test whether the intervals of a posterior hold here: for truths drawn from it, and records predicted from them.
-
     Each truth is inferred from the record and the predicted one together: if posterior and sampler are right, its rank
-    is uniform (Säilynoja, Schmitt, Bürkner & Vehtari 2025, arXiv:2502.03279). It is no test of the assumptions.
-    """
+    is uniform (Säilynoja, Schmitt, Bürkner & Vehtari 2025, arXiv:2502.03279). It is no test of the assumptions."""
     task = _task(posterior, experiment, replicates, probability, seed)
     with open_results_store(task.identity, out, REPLICATES) as store:
         kept = keep_outcomes(store, _replicate, task, replicates, workers=workers)

@@ -244,10 +244,8 @@ def predicted_readings(posterior: xr.DataTree) -> Floats:
 
 
 def parts_of(model: ContourModel) -> dict[str, Flags]:
-    """Return the parts of a record that predict the rest, masks of shape (samples,) by name.
-
-    They are each sweep segment and each pivot, of several, and both halves of the contacts of every segment.
-    """
+    """Return the parts of a record that predict the rest, masks of shape (samples,) by name. They are each sweep
+    segment and each pivot, of several, and both halves of the contacts of every segment."""
     likelihood = model.likelihood
     of_sample, count = likelihood.segments.of_sample, len(likelihood.segments)
     parts = {f"sweep {k + 1}": of_sample == k for k in range(count)} if count > 1 else {}

@@ -35,11 +35,9 @@ _FEWEST_TRIALS = 1000  # draws of the prior before none within reach is an error
 
 
 class ContourModel:
-    """Prior times likelihood, as a function of arrays of parameters, in the record's units.
-
-    Points, (n, d), have the parameters `names`: of the contour and the rig (both are `forward_parameters`), the noise,
-    a discrepancy. `of_path` are columns that move samples on the path; `zero` and `deviation` are by channel.
-    """
+    """Prior times likelihood, as a function of arrays of parameters, in the record's units. Points, (n, d), have the
+    parameters `names`: of the contour and the rig (both are `forward_parameters`), the noise, a discrepancy. `of_path`
+    are columns that move samples on the path; `zero` and `deviation` are by channel."""
 
     def __init__(
         self,

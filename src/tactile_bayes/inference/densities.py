@@ -105,10 +105,8 @@ class Proposal(_Density):
 
     @classmethod
     def fitted(cls, points: Floats, weights: Floats | None = None, ends: Ends = ANYTHING) -> Proposal:
-        """Fit a proposal to points, (n, parameters), with weights of sum one, in any units of the parameters.
-
-        The points are taken for draws of a normal distribution that is truncated at the lower bounds.
-        """
+        """Fit a proposal to points, (n, parameters), with weights of sum one, in any units of the parameters. The
+        points are taken for draws of a normal distribution that is truncated at the lower bounds."""
         weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
         mean = weights @ points
         centred = points - mean
@@ -169,9 +167,8 @@ class Mixture(_Density):
         cls, points: Floats, bent: Sequence[int], parts: int, ends: Ends = ANYTHING, weights: Floats | None = None
     ) -> Mixture:
         """Fit a mixture, normal in the columns `bent`, to points, (n, parameters), by expectation and maximisation.
-
-        Given these, all others have one normal distribution, with a mean linear in them. The weights have the sum one.
-        """
+        Given these, all others have one normal distribution, with a mean linear in them. The weights have the sum
+        one."""
         weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
         mean = weights @ points
         deviation = np.sqrt(weights @ (points - mean) ** 2)
@@ -295,10 +292,8 @@ def approximate(
     deadline: Deadline = NEVER,
     ends: Ends = ANYTHING,
 ) -> Proposal:
-    """Approximate a target by rounds of adaptive importance sampling, from guesses at mean and covariance.
-
-    The most efficient round gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407).
-    """
+    """Approximate a target by rounds of adaptive importance sampling, from guesses at mean and covariance. The most
+    efficient round gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407)."""
     best = proposal = Proposal(centre, WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
     for _ in range(_ADAPTATIONS):
         if deadline.has_passed:
@@ -332,11 +327,9 @@ def _log_within(proposal: Proposal | Mixture, rng: np.random.Generator) -> float
 def refined(
     log_probability: LogProbability, proposal: Proposal, rng: np.random.Generator, deadline: Deadline = NEVER
 ) -> Mixture:
-    """Return a mixture of pieces that cover a bent target, if a proposal covers it poorly; else that alone.
-
-    All draws are weighed by the mean density of all proposals so far (Cornuet et al. 2012, doi
-    10.1111/j.1467-9469.2011.00756.x).
-    """
+    """Return a mixture of pieces that cover a bent target, if a proposal covers it poorly; else that alone. All draws
+    are weighed by the mean density of all proposals so far (Cornuet et al. 2012, doi
+    10.1111/j.1467-9469.2011.00756.x)."""
     size = proposal.mean.size
     best, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()
     points, values = np.empty((0, size)), np.empty(0)

@@ -99,9 +99,7 @@ def _fitted(points: Floats) -> _ScoreFit:
 
 class _ScoreFit:
     """A normal distribution, fitted to points, (n, d), of their normal scores along the columns of `axes`, (d, d).
-
-    Scores are piecewise linear in the place along an axis, for hard bounds and skewness.
-    """
+    Scores are piecewise linear in the place along an axis, for hard bounds and skewness."""
 
     def __init__(self, points: Floats, axes: Floats) -> None:
         self._centre, self._axes, self._back = points.mean(axis=0), axes, np.linalg.inv(axes)
@@ -158,10 +156,8 @@ class _Bridge(NamedTuple):
 
 
 def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
-    """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,).
-
-    At the threshold log Z + log(m/n) both sums are equal (Bennett 1976, doi 10.1016/0021-9991(76)90078-4).
-    """
+    """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,). At the
+    threshold log Z + log(m/n) both sums are equal (Bennett 1976, doi 10.1016/0021-9991(76)90078-4)."""
     if not np.any(np.isfinite(proposed)):
         raise InferenceError(
             "density and fit do not overlap: the density is zero at all proposals; its walls may leave little of the "

@@ -51,10 +51,8 @@ _WHOLE = "whole_sha256"  # attribute of a shortened record: the hash of the whol
 
 @dataclass(frozen=True, eq=False)
 class Experiment(FieldsAlone):
-    """A record, or a template, its rig and the family of its contour, with priors of all unknown parameters.
-
-    With a `gauge`, the contour is known. `events` says whether unloaded samples count, as in `SamplerSettings`.
-    """
+    """A record, or a template, its rig and the family of its contour, with priors of all unknown parameters. With a
+    `gauge`, the contour is known. `events` says whether unloaded samples count, as in `SamplerSettings`."""
 
     record: xr.Dataset
     rig: Rig = field(default_factory=Rig)

@@ -88,10 +88,8 @@ class PointLoadModel:
         return mean, r, squares
 
     def log_probability(self, points: Floats) -> Floats:
-        """Return the log of prior times marginal likelihood of points, shape (n, parameters), in shape (n,).
-
-        With λ = σ²/S², S the coefficients' prior sd, the covariance's determinant is σ^(2n) λ^(−4) det(BᵀB + λ I).
-        """
+        """Return the log of prior times marginal likelihood of points, shape (n, parameters), in shape (n,). With λ =
+        σ²/S², S the coefficients' prior sd, the covariance's determinant is σ^(2n) λ^(−4) det(BᵀB + λ I)."""
         values = np.zeros(len(points))
         for i, prior in enumerate(self.priors.values()):
             values = values + prior.logpdf(points[:, i])
@@ -395,10 +393,8 @@ def predictive_p_value(
     tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = lambda residuals: np.sum(residuals**2, axis=-1)
 ) -> float:
     """Return the posterior predictive p-value of a discrepancy, by default the sum of squares of residuals over noise.
-
     If the model holds, it is closer to one half than a uniform number (Gelman, Meng & Stern 1996, Statistica Sinica 6,
-    733).
-    """
+    733)."""
     posterior = tree["posterior"].to_dataset()
     if "noise_sd" in posterior:
         noise = posterior["noise_sd"].values[..., None]

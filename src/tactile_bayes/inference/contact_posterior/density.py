@@ -32,10 +32,8 @@ ContactPrior = Literal["flat", "polar"] | LogPrior
 
 @dataclass(frozen=True, eq=False)
 class ContactDensity:
-    """Log-density of contacts, given one sample each, in coordinates of the sheet of a phase.
-
-    A sample touches with the angle of friction times its `sense`, which lies between −1 and 1 if it sticks.
-    """
+    """Log-density of contacts, given one sample each, in coordinates of the sheet of a phase. A sample touches with the
+    angle of friction times its `sense`, which lies between −1 and 1 if it sticks."""
 
     samples: Samples
     readings: LoneSamples

@@ -33,10 +33,8 @@ _MAX_DISTANCE = 30.0  # of a mean beyond the edge, in standard deviations, so th
 
 
 class ContactProposal:
-    """Mixture of normal densities on each branch, for each of n samples.
-
-    Shapes: mean (branches, n, k) of way, force[, drive angle]; share (branches, n), maybe 0; ways (branches, n, 2).
-    """
+    """Mixture of normal densities on each branch, for each of n samples. Shapes: mean (branches, n, k) of way, force[,
+    drive angle]; share (branches, n), maybe 0; ways (branches, n, 2)."""
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:
         self._share, self._ways = share, ways
@@ -201,10 +199,8 @@ def mixed(found: ContactDraws, rows: Index, log_prior: Floats, rng: np.random.Ge
 
 
 def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequence) -> ContactWeights:
-    """Return proposals, from normal approximations, and their importance weights.
-
-    Those not certified follow kernels about the best draws (Cappé et al. 2004, doi 10.1198/106186004X12803).
-    """
+    """Return proposals, from normal approximations, and their importance weights. Those not certified follow kernels
+    about the best draws (Cappé et al. 2004, doi 10.1198/106186004X12803)."""
     rng = np.random.default_rng(seed)
     found = _weighed(density, *ContactProposal(*_approximation(density), density.ways).draw(draws, rng))
     for i in np.flatnonzero(~found.certified).tolist():

@@ -178,9 +178,7 @@ def density_of(
     measured: xr.Dataset, cell: LoadCell, friction: float, prior: ContactPrior
 ) -> tuple[ContactDensity, Index, Floats]:
     """Return the density of the loaded samples, with their numbers and the logarithms of their prior probabilities.
-
-    Where a sample may also stick, or slide the other way, it stands there once for each direction of the force.
-    """
+    Where a sample may also stick, or slide the other way, it stands there once for each direction of the force."""
     samples = with_likelier_senses(samples_of(measured, cell), measured, cell, friction)
     if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
         about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))

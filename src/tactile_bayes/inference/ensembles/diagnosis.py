@@ -97,10 +97,8 @@ class Mode:
 
 
 def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Mode, ...]:
-    """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities.
-
-    Only if each ensemble is stationary, disagreement means several modes rather than a slow run; else there are none.
-    """
+    """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities. Only if
+    each ensemble is stationary, disagreement means several modes rather than a slow run; else there are none."""
     if not _are_stationary(samples):
         return ()
     mean, deviation = samples.mean(axis=(1, 2)), samples.std(axis=(1, 2))  # (chain, parameter)

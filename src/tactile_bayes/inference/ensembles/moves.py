@@ -22,9 +22,7 @@ def step_ensembles(
     target: LogProbability, moves: Moves, randoms: Sequence[np.random.RandomState], points: Floats, values: Floats
 ) -> tuple[Floats, Floats]:
     """Return points, (chain, walker, parameter), and their log-density, (chain, walker), after a step of all ensembles.
-
-    Each moves by halves with its own random numbers, as if alone, while the target is evaluated for all at once.
-    """
+    Each moves by halves with its own random numbers, as if alone, while the target is evaluated for all at once."""
     points, values = points.copy(), values.copy()
     shares = np.array([share for _, share in moves])
     chosen, halves = [], []
@@ -50,9 +48,7 @@ def step_ensembles(
 
 class FittedMove(emcee.moves.RedBlueMove):
     """Proposals from a distribution, Student's t by default, fitted to the half of the ensemble that does not move.
-
-    They leave the target invariant however bad the fit is (compare Boehl 2022, doi 10.2139/ssrn.4250395).
-    """
+    They leave the target invariant however bad the fit is (compare Boehl 2022, doi 10.2139/ssrn.4250395)."""
 
     def __init__(
         self, columns: slice = slice(None), fit: Callable[[Floats], Proposal | Mixture] = Proposal.fitted
@@ -78,9 +74,7 @@ class FittedMove(emcee.moves.RedBlueMove):
 
 class NormalMove(emcee.moves.RedBlueMove):
     """Steps that leave a standard normal distribution invariant: a random share of the position and a new normal draw.
-
-    See Cotter, Roberts, Stuart & White 2013, doi 10.1214/13-STS421; half of the steps are new draws.
-    """
+    See Cotter, Roberts, Stuart & White 2013, doi 10.1214/13-STS421; half of the steps are new draws."""
 
     def __init__(self, columns: slice) -> None:
         """Move the parameters in `columns` alone."""

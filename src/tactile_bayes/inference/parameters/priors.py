@@ -48,10 +48,8 @@ _NARROWEST, _WIDEST = 0.05, 3.0  # range of factors on standard deviations in wh
 
 
 def matched_priors(family: str, length: float) -> dict[str, Distribution]:
-    """Return priors of a family's own parameters under which a flank is as curved as in all other families.
-
-    The geometric mean of its radius of curvature up to 45° has the median L/2, and its logarithm a deviation of 1.
-    """
+    """Return priors of a family's own parameters under which a flank is as curved as in all other families. The
+    geometric mean of its radius of curvature up to 45° has the median L/2, and its logarithm a deviation of 1."""
     found: dict[str, Distribution] = {}
     for side, name in sides_of(family_named(family).name).items():
         (stretch, width), powers = _matching(name), family_named(name).length_powers

@@ -166,10 +166,8 @@ class Unknowns:
         return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Apply memory, gains, levers, zeros and curve, in place, to loads, (n, ..., samples, 3) [EI/L, EI/L²].
-
-        Zeros are given as readings, and enter as the loads that the cell reads as such without its own curve.
-        """
+        """Apply memory, gains, levers, zeros and curve, in place, to loads, (n, ..., samples, 3) [EI/L, EI/L²]. Zeros
+        are given as readings, and enter as the loads that the cell reads as such without its own curve."""
         values = self._with_known(values)
         if self.memory:
             of = by_channel(self.sensor, values)
@@ -225,10 +223,8 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
 
 
 def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Unknowns:
-    """Return the parameters of a rig that are unknown and that the record shows, with their priors.
-
-    Noise, discrepancy, and a bias that the likelihood integrates out are not among them.
-    """
+    """Return the parameters of a rig that are unknown and that the record shows, with their priors. Noise, discrepancy,
+    and a bias that the likelihood integrates out are not among them."""
     present = [_SHORT[name] for name in present_channels(measured)]
     rod, pivots, joint = rod_of(measured), len(bases_of(measured)), rig.calibration
     if joint is not None:

@@ -37,9 +37,7 @@ _STEEP = np.array([10.0, 30.0, 30.0])  # change of loads close to snap-off [EI/L
 
 class EncoderErrors:
     """Quadrature nodes (reading less true angle [rad]) and weights over errors of the encoder of a dimensionless cell.
-
-    A sample's log-probability errs by 0.001, and by 0.8 at worst next to an event, which is resolved to the nodes.
-    """
+    A sample's log-probability errs by 0.001, and by 0.8 at worst next to an event, which is resolved to the nodes."""
 
     def __init__(self, cell: LoadCell) -> None:
         noise, step = cell.drive_angle_noise, cell.drive_angle_resolution

@@ -31,10 +31,8 @@ _LARGEST = 50.0  # bound of the change of the logarithm of a radius, far beyond 
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """The point of a contour at one slope angle, and how far it is from where a linear map of the radii has it.
-
-    An arc that was touched stays at its distance from the vertex, linear in the log-radii near a centre only.
-    """
+    """The point of a contour at one slope angle, and how far it is from where a linear map of the radii has it. An arc
+    that was touched stays at its distance from the vertex, linear in the log-radii near a centre only."""
 
     slope_angle: float
     centre: Floats  # logarithms of the radii, at the nodes of interpolation, around which the map is linear
@@ -176,10 +174,8 @@ class NormalApproximation:
         return upper[:, :-1, -1], np.swapaxes(upper[:, :-1, :-1], 1, 2)
 
     def _triangular(self, scales: Floats) -> Floats:
-        """Return Lᵀ with L⁻¹b as last column, and below that the root of the least squares, up to sign.
-
-        Orthogonal transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15.
-        """
+        """Return Lᵀ with L⁻¹b as last column, and below that the root of the least squares, up to sign. Orthogonal
+        transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15."""
         through, certainty = self._information(scales)
         size, root = self.prior.mean.size, self.prior.root
         rows = np.zeros((len(scales), size + through.shape[1], size + 1))
@@ -196,9 +192,7 @@ class NormalApproximation:
 
     def damped(self, scales: Floats, start: Floats, damping: Floats) -> Floats:
         """Return linear parameters, (n, d), after Levenberg–Marquardt steps from a start, (d,), with dampings (n,).
-
-        Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value.
-        """
+        Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value."""
         (through,), (certainty,) = self._information(scales[None])
         root = self.prior.root
         _, sizes, axes = np.linalg.svd(slopes := np.linalg.solve(root.T, through.T).T)
@@ -213,9 +207,7 @@ class NormalApproximation:
 
     def truncated(self, pulled: Floats, root: Floats, normal: Floats) -> tuple[Floats, Floats]:
         """Return numbers, (n, d), for which parameters that may vanish are positive, and the log-determinant, (n,).
-
-        These come last and Lᵀ is upper triangular, so that each depends on its own number and later ones only.
-        """
+        These come last and Lᵀ is upper triangular, so that each depends on its own number and later ones only."""
         normal, growth = normal.copy(), np.zeros(len(normal))
         for k, least in self._least(pulled, root, normal):
             whole = log_ndtr(-least)

@@ -85,9 +85,7 @@ class Observer:
 
     def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, Flags, Floats]:
         """Return residuals (expected less measured) over `noise`, samples loaded alike, and residuals of snap-offs.
-
-        Shapes (n, samples, 3), (n, samples) and (n, sweep segments that end).
-        """
+        Shapes (n, samples, 3), (n, samples) and (n, sweep segments that end)."""
         model, rig = self.model, self.model.unknowns.rig(values)
         loads, _, events = model.likelihood.predict_with_events(contours, rig)
         agree = (loads != 0.0).any(axis=2) == self.loaded
@@ -137,9 +135,7 @@ class Observations(NamedTuple):
 
 def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> Observations:
     """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
-
-    Differences along the parameters give rough slopes, and steps along their singular vectors better ones.
-    """
+    Differences along the parameters give rough slopes, and steps along their singular vectors better ones."""
     model = observer.model
     family = model.family
     assert isinstance(family, ShapeFreeFamily)

@@ -37,9 +37,7 @@ _DRAWS = 4000  # number of draws from a prior for its mean and standard deviatio
 @dataclass(frozen=True, eq=False)
 class Whitening(Coordinates):
     """Logarithms of the scales, and all else standardised by the mean and covariance of a normal approximation there.
-
-    Of what may vanish, by the positive part of that distribution. The fit affects efficiency, not exactness.
-    """
+    Of what may vanish, by the positive part of that distribution. The fit affects efficiency, not exactness."""
 
     approximation: NormalApproximation
     scales: Floats  # amplitude, length scale and noise at the centre of the walkers' starting points, shape (bent,)
@@ -105,10 +103,8 @@ class Whitening(Coordinates):
 
 
 def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:
-    """Return whitening coordinates at the posterior's mode, which is sought from a point, shape (parameters,).
-
-    Damped Gauss–Newton steps alternate with the most probable scales, and snap-offs that are missed become sharper.
-    """
+    """Return whitening coordinates at the posterior's mode, which is sought from a point, shape (parameters,). Damped
+    Gauss–Newton steps alternate with the most probable scales, and snap-offs that are missed become sharper."""
     observer, prior = Observer(model), _linear_prior(model, rng)
     (scales,), (linear,) = split(model, point[None])
     best, found = -np.inf, (-np.inf, scales, linear)
@@ -136,10 +132,8 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
 
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:
-    """Return the most probable scales near the given ones, with white noise of half the scatter at least.
-
-    Less would stop a search far from the mode at the first bend of its ridge.
-    """
+    """Return the most probable scales near the given ones, with white noise of half the scatter at least. Less would
+    stop a search far from the mode at the first bend of its ridge."""
     names = scale_names(model)
     columns = [model.names.index(name) for name in names]
 

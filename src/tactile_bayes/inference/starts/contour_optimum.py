@@ -158,11 +158,9 @@ class FirstOrder(NamedTuple):
 
 
 def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence[Sequence[str]]) -> list[FirstOrder]:
-    """Return what each group of added parameters explains beside a start, the optimum of the model without them.
-
-    It is ½ (sᵀ S⁻¹ s − log det S), Laplace's approximation, of the score s of a group and its information S, less what
-    the others explain, both in prior standard deviations (Rao's score test, and its price).
-    """
+    """Return what each group of added parameters explains beside a start, the optimum of the model without them. It is
+    ½ (sᵀ S⁻¹ s − log det S), Laplace's approximation, of the score s of a group and its information S, less what the
+    others explain, both in prior standard deviations (Rao's score test, and its price)."""
     search, names = _Search(model, _prior_quantiles(model), NEVER), model.forward_parameters
     place = search.coordinates.of(search.named(start)[None])[0] / search.spread
     residuals, loose = search.residuals((place * search.spread)[None])[0], set().union(*added)
@@ -246,10 +244,8 @@ class _Search:
         return np.array([start.get(name, value) for name, value in pairs])
 
     def residuals(self, coordinates: Floats) -> Floats:
-        """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too.
-
-        A bias that the likelihood integrates out is whitened with the noise.
-        """
+        """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too. A
+        bias that the likelihood integrates out is whitened with the noise."""
         model, points, size = self.model, self.points(coordinates), self.middle.size
         least = np.where(model.may_vanish, -model.high, model.low)[:size]
         allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
@@ -416,9 +412,7 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
 
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
     """Return the contour parameters fitted to Step 2's contacts with a rig; None if few are usable, or it is far off.
-
-    The rig's default has the zeros of the unloaded samples.
-    """
+    The rig's default has the zeros of the unloaded samples."""
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None
     rod = model.likelihood.rod

@@ -205,10 +205,8 @@ def _residuals(model: ContourModel, point: Floats) -> Floats:
 
 
 def mean_square_left(model: ContourModel, point: Floats) -> float:
-    """Return the mean square of the residuals at a point over a coarse noise, with outliers clipped.
-
-    Beside a discrepancy they are those of each sample given the ones before it.
-    """
+    """Return the mean square of the residuals at a point over a coarse noise, with outliers clipped. Beside a
+    discrepancy they are those of each sample given the ones before it."""
     from tactile_bayes.load_cell.kalman import given_before  # numba takes a second to load
 
     left, noise = _residuals(model, point)[:, model.present], model.deviations[:, model.present]
@@ -267,12 +265,9 @@ class _Normal(NamedTuple):
 
     @classmethod
     def fitted(cls, draws: Floats, independent: float) -> _Normal:
-        """Return the distribution fitted to draws, (n, k), as many of which as said are independent.
-
-        Only principal axes count whose variances differ from one by more than that number explains (Marchenko & Pastur
-        1967, doi 10.1070/SM1967v001n04ABEH001994), less their bias (Baik & Silverstein 2006, doi
-        10.1016/j.jmva.2005.08.003).
-        """
+        """Return the distribution fitted to draws, (n, k), as many of which as said are independent. Only principal
+        axes count whose variances differ from one by more than that number explains (Marchenko & Pastur 1967, doi
+        10.1070/SM1967v001n04ABEH001994), less their bias (Baik & Silverstein 2006, doi 10.1016/j.jmva.2005.08.003)."""
         variances, axes = np.linalg.eigh(np.cov(draws.T))
         variances = np.maximum(variances, _MIN_VARIANCE)  # if few walkers have moved
         ratio = variances.size / independent
@@ -294,10 +289,8 @@ class _Normal(NamedTuple):
 
 
 def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
-    """Return a normal distribution fitted to draws (walkers, steps, k), and its gain for draws of other walkers.
-
-    How many draws are independent is the number with which a fit to each half of the walkers suits the other best.
-    """
+    """Return a normal distribution fitted to draws (walkers, steps, k), and its gain for draws of other walkers. How
+    many draws are independent is the number with which a fit to each half of the walkers suits the other best."""
     halves = [half.reshape(-1, draws.shape[-1]) for half in np.array_split(draws, 2)]
     gains = {}
     for number in len(draws) * 2.0 ** np.arange(-1, 8):

@@ -34,10 +34,8 @@ _RISING = 3.0
 
 
 class Mover:
-    """Moves particles by distributions fitted to half of them, now and then by differences.
-
-    `rises`: the mean log-density rose in the last step of a fitted distribution by more than chance explains.
-    """
+    """Moves particles by distributions fitted to half of them, now and then by differences. `rises`: the mean
+    log-density rose in the last step of a fitted distribution by more than chance explains."""
 
     def __init__(self, model: ContourModel, random: np.random.RandomState) -> None:
         ends = model.walked_ends
@@ -83,10 +81,8 @@ _MOST_STAGES = 200  # of an update
 
 class Particles:
     """Weighted particles of the record so far, from those of the record before, or from the prior (None).
-
     `log_integral` is that of prior times likelihood within reach; `log_ratios` are predictive densities of the new
-    samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in `Stream.update`.
-    """
+    samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in `Stream.update`."""
 
     def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:
         self.model = model
@@ -116,10 +112,8 @@ class Particles:
         self.log_ratios = np.asarray(expected - self.log_integral)
 
     def _with_wider_noise(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the log-density of points, (n,), and that of new samples with wider noise, (n, factors).
-
-        It is NaN if there is a discrepancy, which may couple a sample to later ones.
-        """
+        """Return the log-density of points, (n,), and that of new samples with wider noise, (n, factors). It is NaN if
+        there is a discrepancy, which may couple a sample to later ones."""
         model = self.model
         values, wider = model.log_prior(points), np.full((len(points), len(WIDER)), -np.inf)
         had = 0 if self._before is None else len(self._before.likelihood.measured)

@@ -89,10 +89,8 @@ class StreamState:
 
 
 def surprise_after(old: StreamState | None, log_ratios: Floats) -> tuple[Floats, float]:
-    """Return the products of ratios after a block, and the logarithm of the largest e-value so far.
-
-    That the model is wrong from the k-th block on has the prior weight 1/(k(k + 1)); blocks to come have no ratio yet.
-    """
+    """Return the products of ratios after a block, and the logarithm of the largest e-value so far. That the model is
+    wrong from the k-th block on has the prior weight 1/(k(k + 1)); blocks to come have no ratio yet."""
     blocks = 1 if old is None else old.updates + 2
     before = np.full(len(WIDER), -np.inf) if old is None else old.log_products
     products = np.logaddexp(before, -np.log(blocks * (blocks + 1.0))) + log_ratios
