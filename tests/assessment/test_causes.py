@@ -171,11 +171,3 @@ def test_a_check_names_the_cause_in_place_of_a_list():
     posterior["causes"] = xr.DataTree(causes(posterior))
     (with_cause,) = (one for one in check(posterior).messages if one.kind == "not described")
     assert 'friction = "default"' in with_cause.details["advice"] != finding.details["advice"]
-
-
-@pytest.mark.slow
-def test_a_rod_is_no_cause_where_nothing_is_wrong():
-    posterior = inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0}))
-    posterior["causes"] = xr.DataTree(causes(posterior))
-    assert posterior["causes"].attrs["described"] == 1
-    assert likely_causes(posterior) == ""

@@ -124,11 +124,9 @@ def _found(mean, root, *, spread):
 
 @pytest.mark.parametrize("width", [3.0, 0.4])
 def test_mean_and_covariance_of_what_is_not_standard_normal_are_found(width):
-    """One direction of twelve has another width, all are shifted: afterwards they are standardised.
-
-    Means within five standard errors of as many draws as walkers; eleven widths of one change by less than a tenth,
-    where those of as many draws would be off by a third.
-    """
+    """One direction of twelve has another width, all are shifted: afterwards they are standardised. Means within five
+    standard errors of as many draws as walkers; eleven widths of one change by less than a tenth, where those of as
+    many draws would be off by a third."""
     axis = np.ones(_SIZE) / np.sqrt(_SIZE)
     mean, root = np.linspace(-1.0, 1.0, _SIZE), np.eye(_SIZE) + (width - 1.0) * np.outer(axis, axis)
     found, _, _ = _found(mean, root, spread=1.4)

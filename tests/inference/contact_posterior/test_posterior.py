@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from arviz_stats.base.array import array_stats
 from scipy import stats
 
@@ -96,14 +95,6 @@ def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(
         assert float(draws.tangential.mean()) == float(tangential)
 
 
-def test_the_same_seed_gives_the_same_draws_and_another_others():
-    one, again, other = (infer(which=[2, 21, 61], draws=400, rng=seed) for seed in (1, 1, 2))
-    xr.testing.assert_identical(again["posterior"].to_dataset(), one["posterior"].to_dataset())
-    there = np.isfinite(stats_of(one).effective_draws.values)
-    same = other["posterior"].contact_x.values == one["posterior"].contact_x.values
-    assert not same[:, :, there].any()
-
-
 def test_layout(contacts):
     posterior = contacts["posterior"].to_dataset()
     assert list(posterior.data_vars) == [*NAMES, "contact_arclength", "drive_angle", "tangential"]
@@ -121,6 +112,7 @@ def test_layout(contacts):
     wanted = {"seed": "1", "prior": "flat", "draws": 2000, "converged": 1, "friction": 0.0}
     assert {name: contacts.attrs[name] for name in wanted} == wanted
     assert contacts.attrs["message"] == "6 contacts"
+    np.testing.assert_array_equal(to_arviz(contacts).posterior["contact_x"], posterior.contact_x)
 
 
 def test_draws_are_contacts(contacts):
@@ -145,11 +137,6 @@ def test_few_draws_will_do_and_say_their_seed_and_progress():
     assert trees[0].attrs["message"] == "2 contacts"
     assert [tree.attrs["seed"] for tree in trees] == ["5, spawn key (0,)", "5, spawn key (1,)"]
     assert calls[-1] == (2, 2)
-
-
-def test_arviz_takes_contacts(contacts):
-    draws = to_arviz(contacts).posterior
-    np.testing.assert_array_equal(draws["contact_x"], contacts["posterior"].contact_x)
 
 
 def test_si_is_the_dimensionless_record_in_other_units():
@@ -280,11 +267,6 @@ def test_records_and_load_cells_that_do_not_go_together_are_refused(record, cell
         infer_contacts(record(), rig=Rig(load_cell=cell), rng=1)
 
 
-def test_a_prior_that_is_no_number_is_refused():
-    with refused(ParameterError, "prior"):
-        infer(which=[61], prior=lambda x, y, slope: np.where(x > 0.0, np.nan, 0.0 * slope))
-
-
 CELLS = {"plain": CELL, "turning": CELL, "SI": SI_CELL, "exact angle": EXACT_ANGLE}
 
 # The first loaded sample of a sweep, in tip contact, in between, in tangential contact, and the last before snap-off.
@@ -307,17 +289,15 @@ def assert_agrees(density, exact):
 
 # Ten numbers a sample, normal errors: false alarm 6e-4 a sample.
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "i"), [(kind, i) for kind, numbers in SAMPLES.items() for i in numbers])
-def test_the_posterior_is_that_of_a_sum_over_all_contacts(kind, i):
-    sample = Sample(measured(kind), i, CELLS[kind])
+@pytest.mark.parametrize(
+    ("kind", "i", "friction"),
+    [("plain", 141, 0.3), *((kind, i, 0.0) for kind, numbers in SAMPLES.items() for i in numbers)],
+)
+def test_the_posterior_is_that_of_a_sum_over_all_contacts(kind, i, friction):
+    sample = Sample(measured(kind), i, CELLS[kind], friction)
     exact = posterior_at_exact_angle(sample, cells=300) if kind == "exact angle" else posterior(sample, cells=44)
-    assert assert_agrees(density_of(measured(kind), CELLS[kind], i), exact).certified.all()
-
-
-@pytest.mark.slow
-def test_with_friction_too():
-    exact = posterior(Sample(measured(), 141, CELL, 0.3))
-    assert_agrees(density_of(measured(), CELL, 141, friction=0.3), exact)
+    density = density_of(measured(kind), CELLS[kind], i, friction=friction)
+    assert assert_agrees(density, exact).certified.all()
 
 
 def random_coordinates(rng, count):
@@ -390,6 +370,7 @@ def test_a_prior_of_ones_own_is_in_the_record_s_units_and_axes(kind, i):
         ("round", ["prior", "'round'"]),
         (lambda x, y, slope: 0.0, ["prior", "shape"]),
         (lambda x, y, slope: x[0], ["prior", "shape"]),
+        (lambda x, y, slope: np.where(x > 0.0, np.nan, 0.0 * slope), ["prior", "not a number"]),
     ],
 )
 def test_a_prior_that_is_none_is_refused(prior, named):

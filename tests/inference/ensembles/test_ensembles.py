@@ -192,12 +192,6 @@ def test_a_log_probability_that_is_no_number_is_refused_with_the_point(bad, caps
     assert printed.out == printed.err == ""
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, None, True])
-def test_bad_seeds_are_refused(seed):
-    with refused(ParameterError, rng=seed):
-        draw_from(standard, 2, settings=SMALL, seed=seed)
-
-
 def test_walkers_of_a_target():
     assert SamplerSettings().walkers_for(2) == 48
     assert SamplerSettings().walkers_for(15) == 90

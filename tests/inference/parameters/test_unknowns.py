@@ -56,10 +56,8 @@ def priors_of(measured, *names, cell=None):
     ids=["none", "EI", "seven", "moment only", "moment only, EI"],
 )
 def test_what_unknowns_cost_is_what_was_found_independently(unknowns, channels, expected):
-    """Standard deviations of a, q and x_c, of profile II in a double sweep at 2°, by Fisher information.
-
-    Within a quarter, since they were quoted to a digit, with a step at events and priors that are not told.
-    """
+    """Standard deviations of a, q and x_c, of profile II in a double sweep at 2°, by Fisher information. Within a
+    quarter, since they were quoted to a digit, with a step at events and priors that are not told."""
     measured = scan(paper_profile("II", q=0.5), drive_step=np.radians(2.0)).record
     measured = measured.assign({c: np.nan * measured[c] for c in CHANNELS if c not in channels})
     model = model_of(measured, unknowns)

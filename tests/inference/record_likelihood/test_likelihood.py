@@ -29,10 +29,8 @@ WIRE_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
 
 
 def exact_loads(record, contour, friction=0.0):
-    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`.
-
-    NaN where friction would hold a rod that is curved toward the object at first, which `scan` leaves out.
-    """
+    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`. NaN where
+    friction would hold a rod that is curved toward the object at first, which `scan` leaves out."""
     out = np.full((record.sizes["sample"], 3), np.nan)
     for sweep in np.unique(record.sweep.values):
         rows = np.flatnonzero(record.sweep.values == sweep)

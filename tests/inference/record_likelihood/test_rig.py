@@ -117,11 +117,8 @@ def test_the_rig_is_found_with_its_gauge_and_what_lasts_of_it_is_calibrated():
 
 @pytest.mark.slow
 def test_two_records_tell_as_much_as_one_of_both():
-    """Of one pin, touched from two pivots.
-
-    A mean of 400 effective draws scatters by 0.05 deviations, a deviation by 4 %: limits are six times those of two
-    posteriors, which leaves room for the error of the density.
-    """
+    """Of one pin, touched from two pivots. A mean of 400 effective draws scatters by 0.05 deviations, a deviation by 4
+    %: limits are six times those of two posteriors, which leaves room for the error of the density."""
     for name in NAMES:
         both, one, first = (r.calibration.posterior["posterior"][name] for r in (rig_of_two(), rig_from(0, 1), rig()))
         assert abs(float(both.mean() - one.mean())) < 0.42 * float(one.std())

@@ -209,9 +209,7 @@ def test_contacts_of_a_long_record_are_of_every_so_many_samples(monkeypatch):
 @pytest.mark.slow
 def test_a_limit_of_time_holds_for_200_000_samples():
     """Ten seconds above the limit, and 1 GB, in a process of its own whose first, short run waits for compiled code.
-
-    Seconds of the processor, for on a machine that others use, too, the clock says little of what follows the limit.
-    """
+    Seconds of the processor, for on a machine that others use, too, the clock says little of what follows the limit."""
     root = Path(__file__).parents[3]
     command = [sys.executable, "-m", "benchmarks.long_records", "200000"]
     done = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True)

@@ -152,11 +152,9 @@ def test_a_start_out_of_reach_leads_somewhere():
 
 @pytest.mark.parametrize(("noise", "spread"), [(1.0, 1.0), pytest.param(1e-3, 3.0, marks=pytest.mark.slow)])
 def test_in_its_coordinates_the_posterior_is_nearly_standard_normal(noise, spread):
-    """At one noise, amplitude and length scale: what is left of the log-probability varies by less than 1.
-
-    With loads 100,000 times their noise, even three times as far out: slopes that rounding errors leave would narrow
-    directions of which the record says nothing.
-    """
+    """At one noise, amplitude and length scale: what is left of the log-probability varies by less than 1. With loads
+    100,000 times their noise, even three times as far out: slopes that rounding errors leave would narrow directions of
+    which the record says nothing."""
     model = model_of(cell=LoadCell(force_noise=noise * CELL.force_noise, moment_noise=noise * CELL.moment_noise))
     whitening = whitened(model)
     normal = spread * np.random.default_rng(3).normal(size=(200, whitening.middle.size - whitening.bent))
@@ -181,11 +179,8 @@ def assert_in_band(result, truth, width, scale=1.0):
     [("I", ALL, 50_000), ("II", ALL, 50_000), ("II", "nothing", 40_000), ("III", ALL, 50_000)],
 )
 def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
-    """Converged in some 100 steps.
-
-    With the unknowns there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
-    each of four ensembles, it makes 344 evaluations in place of 272.
-    """
+    """Converged in some 100 steps. With the unknowns there are 43 parameters in place of 34, and as a step moves two
+    walkers for each parameter in each of four ensembles, it makes 344 evaluations in place of 272."""
     truth = paper_profile(profile, q=0.5)
     measured = CELL.measure(scan(truth, drive_step=np.radians(1.0)).record, rng=1)
     result = infer_contour(measured, family="shape-free", rig=Rig(load_cell=CELL, unknown=unknown), rng=1)
