@@ -80,9 +80,7 @@ def with_bends(model: ContourModel, places: tuple[float, ...]) -> ContourModel:
 
 COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
 _SECONDS = 120.0  # time limit of all searches [s], each of which takes about one
-# Least number of causes that are sought by a search, the likeliest to first order first; beyond them searches go on
-# until one describes the record.
-_FEWEST = 4
+_FEWEST = 4  # causes that are sought at least, the likeliest first; then until one describes the record
 _LEAST = 0.03  # share of the log-evidence of what describes the record below which, to first order, nothing is sought
 _MOST = 0.5  # least share of what any shape explains that one spot explains, to be named in its place
 _PRICE = float(np.log(len(PLACES)))  # of the places at which a spot is sought, in log-evidence

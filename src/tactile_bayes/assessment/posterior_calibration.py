@@ -80,13 +80,8 @@ class PosteriorExperiment(FieldsAlone):
     settings: SamplerSettings
 
     @cached_property
-    def model(self) -> ContourModel:
-        """Model of the record."""
-        return self.experiment.model
-
-    @cached_property
     def exact_model(self) -> ContourModel:
-        """The same with loads to full accuracy."""
+        """Model of the record with loads to full accuracy."""
         model = replace(self.experiment).model
         model.likelihood.exact = True
         return model
@@ -151,7 +146,7 @@ def _replicate(task: tuple[PosteriorExperiment, int]) -> Outcome:
 
 def _made(experiment: PosteriorExperiment, number: int) -> Outcome:
     for_start, for_posterior, for_ranks = child(experiment.seed, number).spawn(3)
-    model, rng = experiment.model, np.random.default_rng(for_ranks)
+    model, rng = experiment.experiment.model, np.random.default_rng(for_ranks)
     simulation = _simulation(experiment, number)
     joint = JointModel(model, replace(experiment.experiment, record=simulation.measured).model)
     walk = _walk(joint, experiment, for_start)
@@ -182,9 +177,9 @@ def _simulation(experiment: PosteriorExperiment, number: int) -> Simulation:
 def _walk(joint: JointModel, experiment: PosteriorExperiment, seed: np.random.SeedSequence) -> Walk:
     """Return the start of the walkers, from draws of the posterior weighted by the further readings."""
     rng, size = np.random.default_rng(seed), len(joint.names)
-    coordinates, ends = joint.coordinates, joint.walked_ends
+    coordinates, ends, of_record = joint.coordinates, joint.walked_ends, experiment.experiment.model
     target = in_coordinates(joint.log_probability, coordinates)
-    surplus = joint.log_probability(experiment.starts) - experiment.model.log_probability(experiment.starts)
+    surplus = joint.log_probability(experiment.starts) - of_record.log_probability(experiment.starts)
     if not np.isfinite(surplus).any():
         raise InferenceError("no draw of the posterior is possible together with a record that it predicts")
     fitted = Proposal.fitted(coordinates.of(experiment.starts), flattened(surplus, _LEAST_EFFECTIVE * size), ends)

@@ -20,8 +20,7 @@ from tactile_bayes.record.origin import with_origin
 from tactile_bayes.rig.parameters import parameter_named
 
 _KEPT_DRAWS = 250  # largest number of draws of each chain for which predictions and events are stored
-# Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
-# 2,700 samples on.
+# Largest number of values in predictions and log-likelihoods, 128 MB: fewer draws are stored from 2,700 samples on.
 _STORED_NUMBERS = 16_000_000
 FEWEST_PREDICTIONS = 100  # least number of predictions that the check of the record requires
 _PATHS = 200  # number of contours whose paths are followed at a time
@@ -34,7 +33,7 @@ def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
     """Return the groups that are known when sampling ends: draws, statistics of the ensembles, and the record."""
     record = model.measured.assign({name: with_origin(model.measured[name]) for name in (*CHANNELS, "drive_angle")})
     log_prior = model.log_prior(draws.samples.reshape(-1, len(model.names))).reshape(draws.log_probability.shape)
-    coords = {name: np.arange(size) for name, size in zip(_BY_DRAW, log_prior.shape, strict=True)}
+    coords = {"chain": np.arange(len(log_prior)), "draw": np.arange(log_prior.shape[1])}
     return {
         "posterior": _labelled(model, draws.samples, np.arange(draws.samples.shape[1])),
         "sample_stats": sample_stats(draws),

@@ -62,8 +62,7 @@ def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) ->
     return log_density
 
 
-# Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
-# lie on the other side as well, which these coordinates exclude.
+# Share of the draws, and distance from x over its median: if a larger share is nearer, the vertex may lie beyond x.
 _MAX_SHARE, _NEAR = 0.01, 0.1
 _STEP = 1e-6  # of central differences in the base's coordinates
 

@@ -20,8 +20,7 @@ Random = np.random.Generator | np.random.RandomState  # emcee's moves have legac
 WIDENING = 1.1  # scale over that of the fitted points: too wide a proposal costs less than too narrow a one
 _FREEDOM = 10.0  # degrees of freedom: tails are heavier than normal ones, at little cost
 _MAX_REDRAWS = 40  # times that points out of bounds are drawn again
-# Truncation points of a normal distribution, in standard deviations from its mean: truncation farther below has no
-# effect, and farther above most draws would be lost.
+# Truncation points of a normal distribution [sd from its mean]: farther ones have no effect, or lose most draws.
 _CUTS = np.linspace(-4.0, 1.0, 101)
 _ROUNDS = 10  # of expectation and maximisation
 # Points that the prior of a part's covariance weighs, and its width over that of all.
@@ -73,27 +72,8 @@ class Ends:
 ANYTHING = Ends(np.array(-np.inf), np.array(np.inf))
 
 
-class _Density:
-    """Draws within bounds with their log-density, from draws without bounds."""
-
-    ends: Ends
-
-    def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
-        """Return points within the bounds, shape (count, parameters), and their `log_density`."""
-        points = self.ends.drawn(lambda count: self.draw_unbounded(random, count), count)
-        return points, self.log_density(points)
-
-    def draw_unbounded(self, random: Random, count: int) -> Floats:
-        """Return points of the distribution without bounds, shape (count, parameters)."""
-        raise NotImplementedError
-
-    def log_density(self, points: Floats) -> Floats:
-        """Return the log-density without bounds at points, (n, parameters), up to a constant of their number."""
-        raise NotImplementedError
-
-
 @dataclass(frozen=True, eq=False)
-class Proposal(_Density):
+class Proposal:
     """Multivariate Student's t distribution between bounds; normal for infinite degrees of freedom."""
 
     mean: Floats  # (parameters,)
@@ -130,13 +110,20 @@ class Proposal(_Density):
             return -0.5 * size * math.log(2.0 * math.pi)
         return float(gammaln(0.5 * (nu + size)) - gammaln(0.5 * nu) - 0.5 * size * math.log(math.pi * nu))
 
+    def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
+        """Return points within the bounds, shape (count, parameters), and their `log_density`."""
+        points = self.ends.drawn(lambda count: self.draw_unbounded(random, count), count)
+        return points, self.log_density(points)
+
     def draw_unbounded(self, random: Random, count: int) -> Floats:
+        """Return points of the distribution without bounds, shape (count, parameters)."""
         steps = random.standard_normal((count, self.mean.size))
         if math.isfinite(self.freedom):
             steps = steps / np.sqrt(random.chisquare(self.freedom, count) / self.freedom)[:, None]
         return np.asarray(self.mean + steps @ self.root.T)
 
     def log_density(self, points: Floats) -> Floats:
+        """Return the log-density without bounds at points, (n, parameters), up to a constant of their number."""
         squares = np.sum(self.steps(points) ** 2, axis=1)
         if math.isinf(self.freedom):
             return np.asarray(-0.5 * squares - self._log_volume)
@@ -157,7 +144,7 @@ class Proposal(_Density):
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture(_Density):
+class Mixture:
     """Several proposals, each for a mode of the target, or a piece of its ridge."""
 
     parts: tuple[Proposal, ...]
@@ -190,8 +177,13 @@ class Mixture(_Density):
         return self.parts[0].mean.size
 
     @property
-    def ends(self) -> Ends:  # type: ignore[override]
+    def ends(self) -> Ends:
         return self.parts[0].ends
+
+    def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
+        """Return points within the bounds, shape (count, parameters), and their `log_density`."""
+        points = self.ends.drawn(lambda count: self.draw_unbounded(random, count), count)
+        return points, self.log_density(points)
 
     @cached_property
     def shares(self) -> Floats:
@@ -265,9 +257,7 @@ _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights ar
 # Four pieces have the efficiency of eight: 5 to 57 % for seven posteriors along bent ridges that a single one covers to
 # 1 to 10 %. After fewer rounds an efficiency that is enough is luck; after more, little is gained.
 _PIECES, _FEWEST, _MOST, _ENOUGH = 4, 4, 16, 0.5
-# Efficiency of a proposal above which the posterior is nearly normal around it: ensembles then converge in some hundred
-# steps.
-EFFICIENT = 0.35
+EFFICIENT = 0.35  # efficiency of a proposal above which ensembles converge in some hundred steps
 _DRAWS_OF_PIECES = 120  # per parameter in each of these rounds
 
 

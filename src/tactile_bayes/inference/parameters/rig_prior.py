@@ -17,8 +17,7 @@ from tactile_bayes.rig.parameters import MAY_VANISH
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.tasks.documents import read_json
 
-# Parameters, by parts of their names, that belong to one record (zeros, misfit, pivots, gauge) or to rod and object
-# (friction).
+# Parts of the names of parameters that belong to one record, or to rod and object (friction).
 _PASSING = ("bias", "drift", "discrepancy", "friction", "base", "gauge")
 _PROBABILITIES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])  # at which quantiles of draws and density are compared
 # Beginnings of the attributes that must agree: the rig's parameters are deviations from what they state.

@@ -45,8 +45,7 @@ class RigValues(NamedTuple):
     length: Any = 1.0  # over the stated one; its rest curvature, and what is added to it, are then per that length
     # Amplitudes of the modes of the rest curvature, shape (n, MOST_MODES); none by default.
     rest_shape: Any = None
-    # Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
-    # after the last given one are not shifted.
+    # Shifts of pivots, in the order of the record [length], (n, pivots, 2); those after the last are not shifted.
     base_shifts: Any = None
 
 

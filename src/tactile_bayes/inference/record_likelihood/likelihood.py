@@ -71,9 +71,7 @@ def _log_density(error: Floats, noise: float, step: float) -> Floats:
     return np.asarray(np.log(ndtr(-near) - ndtr(-far)))
 
 
-# Error of loads over their noise that is negligible for 360 samples: it changes their log-likelihood by less than 0.05
-# in 999 of 1000 records.
-_UNFELT = 2e-3
+_UNFELT = 2e-3  # error of loads over their noise that changes the log-likelihood of 360 samples by less than 0.05
 _LEAST = 1e-10  # least tolerance of loads, over the largest load: tables are no more accurate
 # Least tolerance of loads, over the largest load, for which the pose of a rod with a profile comes from a table: its
 # errors are shares of the loads, which are large where a rod touches an object near its pivot.

@@ -51,8 +51,7 @@ class RecordSegments:
         # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 where it has a history.
         self.senses = kinds[:, 3]
         self.angles_in_sweep_frame = np.where(self.backward[which], np.pi - angle, angle)
-        # Change of the travel with the reading of the encoder, shape (samples,): 0 if the drive carries the base, which
-        # turns no encoder.
+        # Change of the travel with the reading of the encoder, shape (samples,): 0 if the drive carries the base.
         self.pace = self.signs_of_samples.copy()
         self._samples_by_errors: dict[bytes, Segments] = {}
         self._ways: dict[int, tuple[Floats, Floats]] = {}

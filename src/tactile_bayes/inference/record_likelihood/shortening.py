@@ -25,8 +25,7 @@ _FEWEST_BINS = 12  # least number of bins of a segment
 _MOST_SPLIT = 1.25  # largest number of bins after splitting, over that before
 _WIDEST = np.radians(2.0)  # largest width of a bin [rad]; loads between events are cubic in it to 1e-6 EI/L
 _DIVISIBLE = 8  # least number of readings of a bin that is split
-# Improvement of a bin by two straight lines in place of one, in variances of the noise for each channel, beyond which
-# it is split: without a bend its mean is 2.
+# Gain of two straight lines over one, in variances of each channel, that splits a bin: without a bend its mean is 2.
 _BEND = 4.0
 _SAME_ANGLE = 1e-12  # standard deviation of drive angles that is rounding [rad]
 _MARGIN, _MOST_SINGLE = 8, 200  # readings on either side of a snap-off that stay single, and the most around one

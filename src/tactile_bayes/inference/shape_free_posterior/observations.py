@@ -61,8 +61,7 @@ def joined(model: ContourModel, scales: Floats, linear: Floats) -> Floats:
 
 _HUBER_THRESHOLD = 4.0  # residual in standard deviations from which Huber's loss is linear
 _MIN_WIDTH = 0.01  # smallest standard deviation of a snap-off, over half a step of the drive angle
-# Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
-# of the further ones.
+# Step of the first differences of loads, over the scale of each coordinate, and the largest step of further ones.
 _STEP, _LARGEST_STEP = 1e-5, 0.01
 _FURTHER_DIFFERENCES = 2  # number of times that differences are taken again
 _MIN_CHANGE = 0.03  # least singular value of residuals that counts, in deviations per prior scale

@@ -220,8 +220,7 @@ def mean_square_left(model: ContourModel, point: Floats) -> float:
 
 
 _STEPS = (40, 80, 160, 320)  # of each pilot run
-# Gain of mean log-density by a further change of these coordinates, and share of the steps that move a walker, below
-# and above which no further run is made.
+# Gain of a further change, and share of the steps that move a walker, below and above which no further run is made.
 _GOOD_GAIN, _GOOD_MOVING = 0.3, 0.55
 _MIN_VARIANCE = 1e-3  # of these coordinates that is believed
 

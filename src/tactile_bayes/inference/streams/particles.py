@@ -22,15 +22,12 @@ from tactile_bayes.numerics.selection import resampled
 # Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
 # samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution.
 _PARTS = 8
-# Shares of accepted proposals below which a mixture takes the place of a single distribution, and above which a single
-# one is tried again.
+# Shares of accepted proposals below which a mixture is taken, and above which a single distribution is tried again.
 _POOR, _GOOD = 0.3, 0.45
 # Shares of steps by differences of particles, and where hardly any proposal of a fitted distribution is accepted.
 _DIFFERENCES, _MOSTLY_DIFFERENCES = 0.1, 0.5
 _HARDLY = 0.1  # share of accepted proposals below which that is so
-# Increase of the mean log-density in a step, over the standard error of that mean, of particles that are on their way
-# to where the density is larger.
-_RISING = 3.0
+_RISING = 3.0  # increase of the mean log-density in a step, in standard errors, of particles on their way up
 
 
 class Mover:

@@ -74,8 +74,7 @@ class StreamState:
     points: Floats  # particles, shape (n, parameters of the model)
     values: Floats  # logarithm of prior times likelihood of the particles, shape (n,)
     log_weights: Floats  # shape (n,), normalised
-    # Logarithms of the products of ratios of `Particles`, each from one of the blocks on and with the prior weight of
-    # that block, summed over these; shape (factors,).
+    # Logarithms of the products of ratios of `Particles` from each block on, summed by prior weights; shape (factors,).
     log_products: Floats
     log_integral: float  # logarithm of the integral of prior times likelihood
     share: float  # share of the prior within reach
