@@ -122,7 +122,10 @@ class Family:
     def of(cls, posterior: xr.DataTree) -> Family:
         """Return the family of a posterior, from `infer_contour`.
 
-        Raises ------ ParameterError If the posterior does not state it, since a distribution was none of SciPy's.
+        Raises
+        ------
+        ParameterError
+            If the posterior does not state it, since a distribution was none of SciPy's.
         """
         refuse_no_contour(posterior, "posterior")
         said = read_json(stated_text(posterior.attrs, "family_parameters"), "family_parameters")

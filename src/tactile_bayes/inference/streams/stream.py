@@ -320,7 +320,10 @@ class Stream:
     def contour_draws(self, count: int) -> Floats:
         """Return draws of the contour's parameters from the particles, shape (count, parameters of the contour).
 
-        Raises ------ InferenceError Before the first update.
+        Raises
+        ------
+        InferenceError
+            Before the first update.
         """
         check_whole_number("count", count, 1, most=10**7)
         state = self._known_state()
