@@ -25,8 +25,7 @@ from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, 
 from tactile_bayes.inference.evidence import WIDTHS, Evidence, contour_evidence
 from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.parameters.priors import matched_priors
-from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
+from tactile_bayes.inference.parameters.priors import matched_priors, refuse_other_rig
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.numerics.random_numbers import Rng, spawn
 from tactile_bayes.numerics.selection import evenly_spread

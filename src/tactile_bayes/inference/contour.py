@@ -23,7 +23,7 @@ from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, 
 from tactile_bayes.inference.experiment import ContourProblem, Experiment, contour_problem, identity_of
 from tactile_bayes.inference.family import Family, Gauge
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.parameters.rig_prior import rig_prior
+from tactile_bayes.inference.parameters.priors import rig_prior
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn

@@ -22,7 +22,7 @@ from tactile_bayes.inference.family import Family, Gauge, family_of
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.parameters.noise import Noise, noise_of
 from tactile_bayes.inference.parameters.priors import default_priors as contour_priors
-from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
+from tactile_bayes.inference.parameters.priors import refuse_other_rig
 from tactile_bayes.inference.parameters.unknowns import Unknowns, belongs, unknowns_of
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments, without_errors

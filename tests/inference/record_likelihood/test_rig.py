@@ -16,7 +16,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import calibrate_rig, infer_contour
 from tactile_bayes.inference.experiment import Experiment, experiment_of
 from tactile_bayes.inference.family import Gauge
-from tactile_bayes.inference.parameters.rig_prior import rig_prior
+from tactile_bayes.inference.parameters.priors import rig_prior
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rig import Rig

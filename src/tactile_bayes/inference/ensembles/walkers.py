@@ -57,11 +57,10 @@ def scatter_walkers(
     *,
     parameters: int,
     seed: Seed,
-    settings: SamplerSettings | None = None,
+    settings: SamplerSettings,
     floor: Callable[[], float] = lambda: -np.inf,
 ) -> Floats:
     """Return random starting points, (ensembles, walkers, parameters), of a log-probability above a floor."""
-    settings = SamplerSettings() if settings is None else settings
     walkers = settings.walkers_for(parameters)
     # The second half, so that the streams differ from those that the same seed gives to the ensembles themselves.
     seeds = spawn(seed, 2 * settings.ensembles)[settings.ensembles :]
