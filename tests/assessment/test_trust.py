@@ -11,14 +11,16 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL, SOUND, TRUTH, infer_as_stated, measured, posterior, swept
 from helpers.refusals import refused
+from tactile_bayes.assessment import posterior_calibration as module
+from tactile_bayes.assessment.posterior_calibration import JointModel, posterior_calibration
 from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
 from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import LinearFit, Linearisation, parts_of, split_prediction
 from tactile_bayes.assessment.trust import _corrected, draws_digest, trust
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import CalibrationError, InferenceError, ParameterError
 from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.experiment import Experiment, experiment_of
+from tactile_bayes.inference.experiment import Experiment, experiment_of, points_of
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import write_result
 from tactile_bayes.load_cell import RandomWalk
@@ -388,3 +390,66 @@ def test_out_of_reach_there_is_no_fit_and_differences_stay_within_the_bounds_of_
     starts = np.array([[1e-3, TRUTH["q"], TRUTH["x_c"], 1.0]])
     (found,) = Linearisation(model, np.array([10.0, *SCALES[1:]])).fits(readings, starts)
     assert np.isfinite(found.residuals).all()
+
+
+def test_the_joint_density_has_the_prior_once_and_both_likelihoods():
+    experiment = experiment_of(posterior())
+    model, other = experiment.model, experiment_of(posterior()).model
+    points = points_of(posterior(), model.names)[0, :5]
+    prior = model.log_prior(points)
+    joint = JointModel(model, other)
+    assert joint.log_probability(points) == pytest.approx(2.0 * model.log_probability(points) - prior)
+
+
+@pytest.mark.slow
+def test_replicates_are_kept_and_resume(tmp_path):
+    experiment = experiment_of(posterior())
+    two, three = (
+        posterior_calibration(posterior(), experiment, seed=1, replicates=n, out=tmp_path, workers=1) for n in (2, 3)
+    )
+    assert three.attrs["lost"] == 0
+    assert three.attrs["conclusion"] == "too few"
+    assert {"pointwise_in_gap", "pointwise_beside", "contact_region", "snap_off"} <= set(three.claim.values)
+    assert np.isfinite(three.factor).all()
+    assert (three.corrected == 0).all()
+    with pytest.raises(CalibrationError, match="seed"):
+        posterior_calibration(posterior(), experiment, seed=2, replicates=3, out=tmp_path, workers=1)
+    again = posterior_calibration(posterior(), experiment, seed=1, replicates=3, out=tmp_path, workers=1)
+    assert again.equals(three)
+    assert two.ranks.equals(three.ranks.isel(replicate=slice(0, 2)))
+
+
+def test_more_replicates_than_predictions_are_refused():
+    with pytest.raises(InferenceError, match="are needed"):
+        posterior_calibration(posterior(), experiment_of(posterior()), seed=1, replicates=10_000, workers=1)
+
+
+def test_errors_are_outcomes(monkeypatch):
+    monkeypatch.setattr(module, "_made", lambda experiment, number: 1 / 0)
+    found = posterior_calibration(posterior(), experiment_of(posterior()), seed=1, replicates=2, workers=1)
+    assert found.attrs["lost"] == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "conclusion"), [(1.0, "calibrated"), (0.6, "not calibrated")])
+def test_a_sampler_that_is_too_narrow_is_caught_and_a_right_one_is_not(width, conclusion):
+    """The false-alarm rate of a right one is 1 %; the seed is fixed."""
+    tree = posterior().copy()
+    draws = tree["posterior"].to_dataset()
+    narrow = {name: values.mean() + width * (values - values.mean()) for name, values in draws.items()}
+    tree["posterior"] = draws.assign({name: narrow[name].assign_attrs(draws[name].attrs) for name in narrow})
+    experiment = experiment_of(tree)
+    model = experiment.model
+    predicted = tree["posterior_predictive"].to_dataset()
+    points = points_of(tree, model.names)[:, predicted.draw.values].reshape(-1, len(model.names))
+    loads = model.likelihood.load_cell.expected(model.loads(points))
+    cell = model.likelihood.load_cell
+    readings = cell.simulate(loads, rng=5, noise_scale=model.noise_scale(points))
+    shape = predicted.holding_moment.shape
+    columns = {
+        name: (predicted[name].dims, readings[..., i].reshape(shape))
+        for i, name in enumerate(("holding_moment", "force_x", "force_y"))
+    }
+    tree["posterior_predictive"] = predicted.assign(columns)
+    found = posterior_calibration(tree, experiment, seed=1, replicates=100, probability=0.9)
+    assert found.attrs["conclusion"] == conclusion
