@@ -11,20 +11,18 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL, SOUND, TRUTH, infer_as_stated, measured, posterior, swept
 from helpers.refusals import refused
+from tactile_bayes import Family, Rig, infer_contour, trust, write_result
 from tactile_bayes.assessment import posterior_calibration as module
 from tactile_bayes.assessment.posterior_calibration import JointModel, posterior_calibration
 from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
 from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import LinearFit, Linearisation, parts_of, split_prediction
-from tactile_bayes.assessment.trust import _corrected, draws_digest, trust
+from tactile_bayes.assessment.trust import _corrected, draws_digest
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import CalibrationError, InferenceError, ParameterError
-from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.experiment import Experiment, experiment_of, points_of
-from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.result import write_result
 from tactile_bayes.load_cell import RandomWalk
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 
 
 @cache

@@ -13,10 +13,9 @@ from matplotlib import pyplot as plt
 from scipy import stats
 
 from helpers.contour_posteriors import MODEST, infer_as_stated
+from tactile_bayes import scan, to_arviz
 from tactile_bayes.comparison.leave_one_out import left_out
-from tactile_bayes.inference.result import to_arviz
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, RIG
-from tactile_bayes.sweep import scan
 
 # What ArviZ and its parts say of versions to come of themselves and of their dependencies.
 pytestmark = [

@@ -23,22 +23,18 @@ from helpers.contour_posteriors import (
     without,
 )
 from helpers.refusals import refused
+from tactile_bayes import Family, LoadCell, Rig, Rod, SamplerSettings, Translation, infer_contour, scan
 from tactile_bayes.contours import Circle, Ellipse, Parabola
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.contour import contours_of, infer_contour
+from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.parameters.priors import default_priors
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics import blocks
 from tactile_bayes.record import CHANNELS, loads_of, record_hash, to_si
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import Translation, scan, scan_many
+from tactile_bayes.sweep import scan_many
 
 NAMES = ["a", "q", "x_c", "noise_scale"]
 

@@ -17,14 +17,13 @@ from scipy.special import gammaln, ndtr
 
 from helpers.contour_posteriors import CELL, only, swept
 from helpers.refusals import refused
+from tactile_bayes import Family, Rig, SamplerSettings
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_walkers
+from tactile_bayes.inference.ensembles import sample, scatter_walkers
 from tactile_bayes.inference.evidence import WIDTHS, Evidence, bridge_evidence, contour_evidence
 from tactile_bayes.inference.experiment import Experiment, contour_problem
-from tactile_bayes.inference.family import Family
-from tactile_bayes.rig import Rig
 
 LOG_2PI = np.log(2.0 * np.pi)
 

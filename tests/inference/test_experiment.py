@@ -9,17 +9,12 @@ from scipy import stats
 
 from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, measured, only, posterior
 from helpers.refusals import refused
+from tactile_bayes import Family, Rig, Rod, check, infer_contour, scan
 from tactile_bayes.contours import Parabola
-from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.distributions import in_words
 from tactile_bayes.errors import ParameterError, RecordError
-from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.experiment import Experiment, experiment_of, points_of, usual_load_cell
-from tactile_bayes.inference.family import Family
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.sweep import scan
 
 RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
 

@@ -11,8 +11,8 @@ from scipy import stats
 from scipy.integrate import solve_ivp
 
 from helpers.refusals import refused
+from tactile_bayes import SamplerSettings
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.point_load import PointLoadModel, default_priors, infer_point_load, predictive_p_value
 from tactile_bayes.mechanics.clamped_rod import base_curvature
 

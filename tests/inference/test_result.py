@@ -10,16 +10,10 @@ import xarray as xr
 
 from helpers.contour_posteriors import posterior
 from helpers.refusals import refused
+from tactile_bayes import SamplerSettings, read_result, to_arviz, write_result
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.ensembles import SamplerSettings, sample
-from tactile_bayes.inference.result import (
-    posterior_draws,
-    provenance,
-    read_result,
-    sample_stats,
-    to_arviz,
-    write_result,
-)
+from tactile_bayes.inference.ensembles import sample
+from tactile_bayes.inference.result import posterior_draws, provenance, sample_stats
 
 SETTINGS = SamplerSettings(ensembles=2, walkers=4, block_steps=8, max_steps=8)
 

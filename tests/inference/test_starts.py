@@ -8,14 +8,14 @@ import pytest
 from scipy import stats
 
 from helpers.contour_posteriors import CELL
+from tactile_bayes import Rig, scan
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of, smooth_optimum
 from tactile_bayes.inference.starts.contour_start import mean_square_left, standardise
-from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.sweep import scan
+from tactile_bayes.rig import NOTHING
 
 PASSED = Deadline.after(0.0)
 CENTRE = np.array([1.0, 2.0])

@@ -13,15 +13,15 @@ from scipy.special import logsumexp
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL, SOUND, measured, only, posterior
 from helpers.refusals import refused
+from tactile_bayes import Family, Rig, result, target
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.evidence import contour_evidence
 from tactile_bayes.inference.experiment import points_of
-from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.target import Target, result, target
+from tactile_bayes.inference.target import Target
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.report.reproduction import hindrances
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.rig_prior import RigPrior
 
 STATED = Rig(load_cell=CELL, unknown="nothing")

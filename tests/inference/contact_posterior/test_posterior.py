@@ -21,16 +21,12 @@ from helpers.contact_posteriors import (
     weighed_moments,
 )
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, infer_contacts, reconstruct, scan, to_arviz
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
-from tactile_bayes.inference.contact_posterior import infer_contacts
-from tactile_bayes.inference.result import to_arviz
-from tactile_bayes.load_cell import LoadCell, RandomWalk
+from tactile_bayes.load_cell import RandomWalk
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, record_hash
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
 
 # No contact; tip or tangential; clearly tangential; before snap-off; backward ones.
 SOME = np.array([2, 20, 21, 30, 61, 99, 120])

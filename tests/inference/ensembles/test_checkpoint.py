@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from helpers.refusals import refused
+from tactile_bayes import SamplerSettings
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, checkpoint, sample
+from tactile_bayes.inference.ensembles import Draws, checkpoint, sample
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
 STEADY = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=4000, min_ess=200, max_r_hat=1.05)

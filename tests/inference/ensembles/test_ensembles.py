@@ -9,17 +9,10 @@ from scipy.signal import lfilter
 
 from helpers.interrupts import interrupted_at
 from helpers.refusals import refused
+from tactile_bayes import SamplerSettings
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.coordinates import Coordinates, Logarithms
-from tactile_bayes.inference.ensembles import (
-    Draws,
-    Progress,
-    SamplerSettings,
-    diagnosis,
-    run_state,
-    sample,
-    scatter_walkers,
-)
+from tactile_bayes.inference.ensembles import Draws, Progress, diagnosis, run_state, sample, scatter_walkers
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time, modes_of, walker_major
 from tactile_bayes.inference.ensembles.run_state import Block, RunState
 from tactile_bayes.inference.result import sample_stats

@@ -10,21 +10,16 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL, DEVIATIONS, TRUTH, only
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, Rod, SamplerSettings, Translation, infer_contour, make_record, scan
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.record.attributes import same_rod
-from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.stated import rod_with
-from tactile_bayes.sweep import Translation, scan
 
 SI = Rod(length=0.1, flexural_rigidity=2e-4, diameter=0.002)
 

@@ -8,11 +8,11 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL
+from tactile_bayes import Rig
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.record import CHANNELS, loads_of
-from tactile_bayes.rig import Rig
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 SHIFTS = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6)]

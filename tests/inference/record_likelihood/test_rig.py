@@ -11,19 +11,15 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, only, swept, without
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, Stream, calibrate_rig, contour_band, infer_contour
 from tactile_bayes.contours import Circle, Parabola, from_function
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.contour import calibrate_rig, infer_contour
 from tactile_bayes.inference.experiment import Experiment, experiment_of
 from tactile_bayes.inference.family import Gauge
 from tactile_bayes.inference.parameters.priors import rig_prior
-from tactile_bayes.inference.streams.stream import Stream
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rig import Rig
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import expanded
-from tactile_bayes.uncertainty.band import contour_band
 
 PIN, OBJECT = Circle(r=0.2, q=0.5), Parabola(0.7, 0.45)
 UNKNOWN = only("rigidity_scale", "drive_angle_offset", "lever")

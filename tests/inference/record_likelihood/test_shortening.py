@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import CELL
-from tactile_bayes import SamplerSettings, Translation, infer_contacts, infer_contour, scan
+from tactile_bayes import Rig, SamplerSettings, Translation, infer_contacts, infer_contour, scan
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood import shortening
@@ -21,7 +21,7 @@ from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 
 CONTOUR = paper_profile("II", q=0.5)
 BRIEF = SamplerSettings(ensembles=2, walkers=48, block_steps=5, max_steps=5)

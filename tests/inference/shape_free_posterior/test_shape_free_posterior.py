@@ -6,23 +6,17 @@ from scipy import stats
 from scipy.special import gamma, kv
 
 from helpers.contour_posteriors import CELL, only, swept, without
+from tactile_bayes import Family, LoadCell, Rig, Rod, SamplerSettings, contour_band, infer_contour, scan
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.diagnostics.predictive_check import predictive_check
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import Anchor
 from tactile_bayes.inference.shape_free_posterior.observations import Observer, linear_names
 from tactile_bayes.inference.shape_free_posterior.whitening import _linear_prior, whitening_at
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.rig_prior import RigPrior
-from tactile_bayes.sweep import scan
-from tactile_bayes.uncertainty.band import contour_band
 
 SI = Rod(length=0.1, flexural_rigidity=2e-4)
 SI_CELL = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)

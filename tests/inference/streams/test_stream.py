@@ -11,6 +11,7 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL
 from helpers.refusals import refused
+from tactile_bayes import Rig
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.evidence import contour_evidence
@@ -18,7 +19,6 @@ from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.streams import particles
 from tactile_bayes.inference.streams.stream_state import read_tree, surprise_after
 from tactile_bayes.record.netcdf import write_netcdf
-from tactile_bayes.rig import Rig
 
 STATED = Rig(load_cell=CELL, unknown="nothing")
 PROFILE = tb.contours.paper_profile("II", q=0.5)
