@@ -24,6 +24,7 @@ from tactile_bayes.tasks import alone_in, check_format, differences, is_temporar
 from tactile_bayes.tasks.documents import read_json
 
 _START = "starting points"  # they follow from the other entries
+_MOST_NAMED = 20  # largest number of differing entries that a message names
 
 
 def identity_of_run(
@@ -114,7 +115,7 @@ class Checkpoint:
         check_format(table["format"], _FORMAT, lambda what: InferenceError(f"{self._path} {what}: {other}"), _FORMAT)
         there = {name: str(value) for name, value in table["identity"].items()}
         but_start = ({n: v for n, v in one.items() if n != _START} for one in (there, self._identity))
-        if found := differences(*but_start) or differences(there, self._identity):
+        if found := differences(*but_start, most=_MOST_NAMED) or differences(there, self._identity):
             raise InferenceError(
                 f"{self._path.parent} is the checkpoint of another run: {found}; give another folder, or what was "
                 "given then (only max_steps, max_seconds, min_ess and max_r_hat may change)"

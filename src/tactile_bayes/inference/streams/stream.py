@@ -307,7 +307,7 @@ class Stream:
             own = validate(record).isel(sample=slice(0, own.sizes["sample"]))
         experiment = Experiment(own, self._rig, self._family)
         state = StreamState(own, experiment, **numbers)
-        differing = differences(identity, self._identity(experiment))
+        differing = differences(identity, self._identity(experiment), most=20)
         if not differing:
             with threadpool_limits(1):
                 values = experiment.model.log_probability(state.points)
