@@ -27,13 +27,14 @@ from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, spawn
 from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.tasks import FieldsAlone
 
 _REPEATS = 3  # of a measurement of time, of which the shortest counts
 _LEAST, _LARGEST = 2.0**-54, 1.0 - 2.0**-53  # probabilities at which quantiles are finite
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class Target(FieldsAlone):
     """Prior and likelihood of a contour, the rig and the noise, given a record: see `tactile_bayes.target`.
 
     Points are arrays of shape (..., parameters), in the order of `names` and the record's units; a density has their
@@ -43,9 +44,6 @@ class Target:
     """
 
     experiment: Experiment
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"experiment": self.experiment}
 
     def __repr__(self) -> str:
         samples = self.model.measured.sizes["sample"]
