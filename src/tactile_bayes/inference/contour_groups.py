@@ -33,7 +33,7 @@ def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
     """Return the groups that are known when sampling ends: draws, statistics of the ensembles, and the record."""
     record = model.measured.assign({name: with_origin(model.measured[name]) for name in (*CHANNELS, "drive_angle")})
     log_prior = model.log_prior(draws.samples.reshape(-1, len(model.names))).reshape(draws.log_probability.shape)
-    coords = {"chain": np.arange(len(log_prior)), "draw": np.arange(log_prior.shape[1])}
+    coords = {"chain": np.arange(len(log_prior)), "draw": np.arange(draws.samples.shape[1])}
     return {
         "posterior": _labelled(model, draws.samples, np.arange(draws.samples.shape[1])),
         "sample_stats": sample_stats(draws),
