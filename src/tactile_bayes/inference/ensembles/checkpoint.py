@@ -114,8 +114,8 @@ class Checkpoint:
         other = "or give another folder"
         check_format(table["format"], _FORMAT, lambda what: InferenceError(f"{self._path} {what}: {other}"), _FORMAT)
         there = {name: str(value) for name, value in table["identity"].items()}
-        one, other = ({n: v for n, v in each.items() if n != _START} for each in (there, self._identity))
-        if found := differences(one, other, most=_MOST_NAMED) or differences(there, self._identity):
+        before, now = ({n: v for n, v in each.items() if n != _START} for each in (there, self._identity))
+        if found := differences(before, now, most=_MOST_NAMED) or differences(there, self._identity):
             raise InferenceError(
                 f"{self._path.parent} is the checkpoint of another run: {found}; give another folder, or what was "
                 "given then (only max_steps, max_seconds, min_ess and max_r_hat may change)"
