@@ -23,7 +23,7 @@ import xarray as xr
 import tactile_bayes as tb
 from benchmarks.challenge.score import COLUMNS, HERE, PROBABILITY, RECORDS, STEP
 from tactile_bayes.arrays import Floats
-from tactile_bayes.assessment.linear_fit import Linearisation
+from tactile_bayes.assessment.split_prediction import Linearisation
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_optimum import optimum_of

@@ -3,16 +3,13 @@ import pytest
 from scipy import stats
 
 from helpers.contour_posteriors import only, posterior, swept
+from tactile_bayes import Family, LoadCell, Rig, Rod
 from tactile_bayes.assessment import assumptions as module
 from tactile_bayes.assessment.assumptions import alternatives_by_channel, alternatives_of, band_by_assumption
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.stored_experiment import experiment_of
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.inference.experiment import Experiment, experiment_of
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import MEMORY
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import expanded

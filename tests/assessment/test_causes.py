@@ -7,22 +7,15 @@ import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import CELL, swept
-from tactile_bayes.assessment.causes import causes, causes_beside
-from tactile_bayes.assessment.local_bends import PLACES, LocalBends, with_bends
+from tactile_bayes import Rig, SamplerSettings, causes, check, infer_contour, read_result, scan, write_result
+from tactile_bayes.assessment.causes import PLACES, LocalBends, causes_beside, with_bends
 from tactile_bayes.calibration.simulated_experiment import Misspecification
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.findings import likely_causes
-from tactile_bayes.diagnostics.result_check import check
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.deadline import Deadline
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.result import read_result, write_result
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.starts.contour_optimum import first_order, optimum_beside
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import scan
 
 BRIEF = SamplerSettings(ensembles=2, walkers=34, max_steps=50)
 SHAPE = Parabola(0.5, 0.5)
@@ -173,11 +166,3 @@ def test_a_check_names_the_cause_in_place_of_a_list():
     posterior["causes"] = xr.DataTree(causes(posterior))
     (with_cause,) = (one for one in check(posterior).messages if one.kind == "not described")
     assert 'friction = "default"' in with_cause.details["advice"] != finding.details["advice"]
-
-
-@pytest.mark.slow
-def test_a_rod_is_no_cause_where_nothing_is_wrong():
-    posterior = inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0}))
-    posterior["causes"] = xr.DataTree(causes(posterior))
-    assert posterior["causes"].attrs["described"] == 1
-    assert likely_causes(posterior) == ""

@@ -10,7 +10,7 @@ from tactile_bayes.calibration.simulated_experiment import Misspecification
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
+from tactile_bayes.inference.parameters.unknowns import RigValues
 
 # A contour as a model draws it: y = 0.4 + 0.6 (x − 0.1)².
 DRAWN = family_named("parabola").build(np.array([0.6]), np.array([0.4]), np.array([0.1]))

@@ -21,8 +21,7 @@ from tactile_bayes.comparison.leave_one_out import left_out, left_out_from_wider
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.load_cell import RandomWalk
 
 SIGMAS = 5.0

@@ -27,7 +27,7 @@ from tactile_bayes.diagnostics import Check
 from tactile_bayes.diagnostics.findings import Finding
 from tactile_bayes.diagnostics.inspection import inspect_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.checkpoint import open_checkpoint
 from tactile_bayes.inference.ensembles.run_state import Block, RunState
 from tactile_bayes.inference.ensembles.walkers import first_random_state

@@ -13,10 +13,9 @@ from matplotlib import pyplot as plt
 from scipy import stats
 
 from helpers.contour_posteriors import MODEST, infer_as_stated
+from tactile_bayes import scan, to_arviz
 from tactile_bayes.comparison.leave_one_out import left_out
-from tactile_bayes.inference.result import to_arviz
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, RIG
-from tactile_bayes.sweep import scan
 
 # What ArviZ and its parts say of versions to come of themselves and of their dependencies.
 pytestmark = [
@@ -70,6 +69,16 @@ def two(tree: Any) -> dict[str, Any]:
 Uses = dict[str, Callable[[Any, Any], Any] | str]
 """Calls of a library and a tree by the function's name, or why there is none."""
 
+
+def plain(names: str) -> Uses:
+    """Functions that take the tree alone."""
+    return {name: lambda library, tree, name=name: getattr(library, name)(tree) for name in names.split()}
+
+
+def none(reason: str, names: str) -> Uses:
+    return dict.fromkeys(names.split(), reason)
+
+
 NO_ENERGY = "of Hamiltonian samplers"
 REFITS = "infers again through a wrapper of the model, which trust and compare_families do by themselves"
 DISCRETE = "of discrete or binary data"
@@ -77,32 +86,25 @@ SURVIVAL = "of times of survival"
 REGRESSION = "of a regression whose posterior holds a mean for every observation"
 TOOL = "a tool for other functions"
 ARVIZ: Uses = {
+    **none(NO_ENERGY, "bfmi plot_energy plot_parallel"),
+    **none(TOOL, "make_ufunc smooth_data wrap_xarray_ufunc"),
+    **none(REFITS, "reloo"),
+    **none(DISCRETE, "plot_separation"),
+    **plain("ess hdi loo mcse rhat summary waic plot_autocorr plot_bpv plot_density plot_dist_comparison plot_ess"),
+    **plain("plot_forest plot_mcse plot_pair plot_posterior plot_rank plot_trace plot_violin"),
     "apply_test_function": lambda az, tree: az.apply_test_function(tree, lambda y, _: y.mean(), inplace=False),
     "autocorr": lambda az, tree: az.autocorr(values(tree)),
     "autocov": lambda az, tree: az.autocov(values(tree)),
     "bayes_factor": lambda az, tree: az.bayes_factor(tree, "q", ref_val=middle(tree)),
-    "bfmi": NO_ENERGY,
     "compare": lambda az, tree: az.compare(two(tree)),
-    "ess": lambda az, tree: az.ess(tree),
-    "hdi": lambda az, tree: az.hdi(tree),
     "kde": lambda az, tree: az.kde(values(tree).ravel()),
-    "loo": lambda az, tree: az.loo(tree),
     "loo_pit": lambda az, tree: az.loo_pit(tree, y="record"),
-    "make_ufunc": TOOL,
-    "mcse": lambda az, tree: az.mcse(tree),
-    "plot_autocorr": lambda az, tree: az.plot_autocorr(tree),
     "plot_bf": lambda az, tree: az.plot_bf(tree, "q", ref_val=middle(tree)),
-    "plot_bpv": lambda az, tree: az.plot_bpv(tree),
     "plot_compare": lambda az, tree: az.plot_compare(az.compare(two(tree))),
-    "plot_density": lambda az, tree: az.plot_density(tree),
     "plot_dist": lambda az, tree: az.plot_dist(values(tree)),
-    "plot_dist_comparison": lambda az, tree: az.plot_dist_comparison(tree),
     "plot_dot": lambda az, tree: az.plot_dot(values(tree).ravel()[:100]),
     "plot_ecdf": lambda az, tree: az.plot_ecdf(values(tree).ravel()),
     "plot_elpd": lambda az, tree: az.plot_elpd(two(tree)),
-    "plot_energy": NO_ENERGY,
-    "plot_ess": lambda az, tree: az.plot_ess(tree),
-    "plot_forest": lambda az, tree: az.plot_forest(tree),
     "plot_hdi": lambda az, tree: az.plot_hdi(
         tree.constant_data.drive_angle.values, tree.posterior_predictive.record.values[..., 0]
     ),
@@ -112,100 +114,61 @@ ARVIZ: Uses = {
         idata=tree, y="record", x=tree.constant_data.drive_angle, plot_dim="row", num_samples=20
     ),
     "plot_loo_pit": lambda az, tree: az.plot_loo_pit(tree, y="record"),
-    "plot_mcse": lambda az, tree: az.plot_mcse(tree),
-    "plot_pair": lambda az, tree: az.plot_pair(tree),
-    "plot_parallel": "of divergences, of Hamiltonian samplers",
-    "plot_posterior": lambda az, tree: az.plot_posterior(tree),
     "plot_ppc": lambda az, tree: az.plot_ppc(tree, num_pp_samples=20),
-    "plot_rank": lambda az, tree: az.plot_rank(tree),
-    "plot_separation": DISCRETE,
-    "plot_trace": lambda az, tree: az.plot_trace(tree),
     "plot_ts": lambda az, tree: az.plot_ts(tree, y="record", plot_dim="row", num_samples=20),
-    "plot_violin": lambda az, tree: az.plot_violin(tree),
     "psens": lambda az, tree: (az.psens(tree), az.psens(tree, component="likelihood")),
     "psislw": lambda az, tree: az.psislw(-tree.log_likelihood.record.values[..., 0, 0].ravel()),
     "r2_samples": lambda az, tree: az.r2_samples(*predicted(tree)),
     "r2_score": lambda az, tree: az.r2_score(*predicted(tree)),
-    "reloo": REFITS,
-    "rhat": lambda az, tree: az.rhat(tree),
-    "smooth_data": TOOL,
-    "summary": lambda az, tree: az.summary(tree),
-    "waic": lambda az, tree: az.waic(tree),
     "weight_predictions": lambda az, tree: az.weight_predictions([tree, tree]),
-    "wrap_xarray_ufunc": TOOL,
 }
 ARVIZ_STATS: Uses = {
+    **none(NO_ENERGY, "bfmi"),
+    **none(TOOL, "get_function get_log_likelihood"),
+    **none(REFITS, "loo_kfold loo_moment_match reloo"),
+    **none(REGRESSION, "bayesian_r2 residual_r2"),
+    **none(SURVIVAL, "generate_survival_curves kaplan_meier"),
+    "loo_approximate_posterior": "of draws of an approximation, not of the posterior",
+    "update_subsample": "goes on with loo_subsample",
+    **plain(
+        "ess eti hdi histogram kde loo loo_pit loo_score mcse mean median mode psense_summary qds rhat summary thin"
+    ),
     "bayes_factor": lambda st, tree: st.bayes_factor(tree, var_names="q", ref_vals=middle(tree)),
-    "bayesian_r2": REGRESSION,
-    "bfmi": NO_ENERGY,
     "ci_in_rope": lambda st, tree: st.ci_in_rope(tree, rope=(0.0, 1.0)),
     "compare": lambda st, tree: st.compare(two(tree)),
     "ecdf": lambda st, tree: st.ecdf(tree.posterior.dataset),
-    "ess": lambda st, tree: st.ess(tree),
-    "eti": lambda st, tree: st.eti(tree),
-    "generate_survival_curves": SURVIVAL,
-    "get_function": TOOL,
-    "get_log_likelihood": TOOL,
-    "hdi": lambda st, tree: st.hdi(tree),
-    "histogram": lambda st, tree: st.histogram(tree),
-    "kaplan_meier": SURVIVAL,
-    "kde": lambda st, tree: st.kde(tree),
     "kl_divergence": lambda st, tree: st.kl_divergence(tree, tree, var_names="a"),
-    "loo": lambda st, tree: st.loo(tree),
-    "loo_approximate_posterior": "of draws of an approximation, not of the posterior",
     "loo_expectations": lambda st, tree: st.loo_expectations(one_channel(tree)),
     "loo_i": lambda st, tree: st.loo_i({"row": 3, "channel": "force_x"}, tree),
-    "loo_kfold": REFITS,
     "loo_metrics": lambda st, tree: st.loo_metrics(one_channel(tree)),
-    "loo_moment_match": REFITS,
-    "loo_pit": lambda st, tree: st.loo_pit(tree),
     "loo_r2": lambda st, tree: st.loo_r2(one_channel(tree), var_name="record"),
-    "loo_score": lambda st, tree: st.loo_score(tree),
     "loo_subsample": lambda st, tree: st.loo_subsample(tree, observations=100).elpd,
-    "mcse": lambda st, tree: st.mcse(tree),
-    "mean": lambda st, tree: st.mean(tree),
-    "median": lambda st, tree: st.median(tree),
     "metrics": lambda st, tree: st.metrics(one_channel(tree)),
-    "mode": lambda st, tree: st.mode(tree),
     "psense": lambda st, tree: (st.psense(tree), st.psense(tree, group="likelihood")),
-    "psense_summary": lambda st, tree: st.psense_summary(tree),
-    "qds": lambda st, tree: st.qds(tree),
-    "reloo": REFITS,
-    "residual_r2": REGRESSION,
-    "rhat": lambda st, tree: st.rhat(tree),
     "rhat_nested": lambda st, tree: st.rhat_nested(tree, superchain_ids=[0, 1]),
-    "summary": lambda st, tree: st.summary(tree),
-    "thin": lambda st, tree: st.thin(tree),
-    "update_subsample": "goes on with loo_subsample",
     "wasserstein": lambda st, tree: st.wasserstein(tree, tree, var_names="a", joint=False, num_samples=50),
     "weight_predictions": lambda st, tree: st.weight_predictions([tree, tree]),
 }
 ARVIZ_PLOTS: Uses = {
+    **none(NO_ENERGY, "plot_energy"),
+    **none(DISCRETE, "plot_ppc_pava plot_ppc_pava_residuals plot_ppc_rootogram"),
+    **none(SURVIVAL, "plot_ppc_censored"),
+    "plot_ecdf_pit": "of ranks of a calibration: tb.calibrate has its own",
+    **plain("plot_autocorr plot_convergence_dist plot_dgof plot_dgof_dist plot_dist plot_ess plot_ess_evolution"),
+    **plain("plot_forest plot_loo_pit plot_mcse plot_pair plot_parallel plot_ppc_dist plot_ppc_tstat plot_trace_dist"),
+    **plain(
+        "plot_prior_posterior plot_psense_dist plot_psense_quantities plot_rank plot_rank_dist plot_ridge plot_trace"
+    ),
     "add_bands": lambda ap, tree: ap.add_bands(ap.plot_dist(tree), values={"q": [(0.0, middle(tree))]}),
     "add_lines": lambda ap, tree: ap.add_lines(ap.plot_dist(tree), values={"q": middle(tree)}),
     "combine_plots": lambda ap, tree: ap.combine_plots(tree, plots=[(ap.plot_trace, {}), (ap.plot_rank, {})]),
-    **{
-        name: lambda ap, tree, name=name: getattr(ap, name)(tree)
-        for name in (
-            *("plot_autocorr", "plot_convergence_dist", "plot_dgof", "plot_dgof_dist", "plot_dist", "plot_ess"),
-            *("plot_ess_evolution", "plot_forest", "plot_loo_pit", "plot_mcse", "plot_pair", "plot_parallel"),
-            *("plot_ppc_dist", "plot_ppc_tstat", "plot_prior_posterior", "plot_psense_dist", "plot_psense_quantities"),
-            *("plot_rank", "plot_rank_dist", "plot_ridge", "plot_trace", "plot_trace_dist"),
-        )
-    },
     "plot_bf": lambda ap, tree: ap.plot_bf(tree, var_names="q", ref_val=middle(tree)),
     "plot_compare": lambda ap, tree: ap.plot_compare(library("arviz_stats").compare(two(tree))),
-    "plot_ecdf_pit": "of ranks of a calibration: tb.calibrate has its own",
-    "plot_energy": NO_ENERGY,
     "plot_khat": lambda ap, tree: ap.plot_khat(library("arviz_stats").loo(tree, pointwise=True)),
     "plot_lm": lambda ap, tree: ap.plot_lm(one_channel(tree), x="drive_angle", y="record"),
     "plot_pair_focus": lambda ap, tree: ap.plot_pair_focus(tree, focus_var="q"),
-    "plot_ppc_censored": SURVIVAL,
     "plot_ppc_interval": lambda ap, tree: ap.plot_ppc_interval(one_channel(tree)),
-    "plot_ppc_pava": DISCRETE,
-    "plot_ppc_pava_residuals": DISCRETE,
     "plot_ppc_pit": lambda ap, tree: ap.plot_ppc_pit(one_channel(tree)),
-    "plot_ppc_rootogram": DISCRETE,
 }
 USES = {"arviz": ARVIZ, "arviz_stats": ARVIZ_STATS, "arviz_plots": ARVIZ_PLOTS}
 KNOWN = {"arviz": "0.23", "arviz_stats": "0.8", "arviz_plots": "0.8"}

@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactile_bayes.inference.densities import Ends, Mixture, Proposal, effective_number, normalised
-from tactile_bayes.inference.importance import approximate, refined
+from tactile_bayes.inference.densities import (
+    Ends,
+    Mixture,
+    Proposal,
+    approximate,
+    effective_number,
+    normalised,
+    refined,
+)
 
 MEAN = np.array([1.0, -2.0, 0.5])
 ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])  # units that differ, and correlations

@@ -14,21 +14,14 @@ from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, measured, w
 from helpers.refusals import refused
 from helpers.report_pages import analysed_quickly
 from helpers.tasks import through_a_pipe
-from tactile_bayes import plotting
+from tactile_bayes import Family, Rig, Rod, Stream, check, contour_band, gap, plotting, read_result, write_report
 from tactile_bayes.contours import Ellipse
 from tactile_bayes.diagnostics.predictive_check import predictive_check
-from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.result import read_result
-from tactile_bayes.inference.streams.stream import Stream
-from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.inference.family import family_of
 from tactile_bayes.record import to_si
-from tactile_bayes.report import write_report
-from tactile_bayes.rig import Rig
-from tactile_bayes.uncertainty.band import contour_band, normal_band
-from tactile_bayes.uncertainty.gap import gap
+from tactile_bayes.uncertainty.band import normal_band
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 from tactile_bayes.uncertainty.summary import summary
 

@@ -10,10 +10,10 @@ import xarray as xr
 
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL
-from tactile_bayes.inference.stored_experiment import contact_points, found_rig
+from tactile_bayes import Rig
+from tactile_bayes.inference.experiment import contact_points, found_rig
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, loads_of, to_dimensionless, with_rod
-from tactile_bayes.rig import Rig
 
 CONTOUR = tb.contours.Parabola(0.5, q=0.5)
 

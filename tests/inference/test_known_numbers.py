@@ -10,12 +10,11 @@ import xarray as xr
 
 from helpers.contour_posteriors import BRIEF, infer_as_stated, only, swept
 from helpers.known_numbers import scaled
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes import Rig
+from tactile_bayes.inference.experiment import Experiment, found_rig
 from tactile_bayes.inference.family import Gauge
-from tactile_bayes.inference.stored_experiment import found_rig
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.report.frames import motion_of
-from tactile_bayes.rig import Rig
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 

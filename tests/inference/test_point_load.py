@@ -11,10 +11,9 @@ from scipy import stats
 from scipy.integrate import solve_ivp
 
 from helpers.refusals import refused
+from tactile_bayes import SamplerSettings
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.point_load import default_priors, infer_point_load, predictive_p_value
-from tactile_bayes.inference.point_load_model import PointLoadModel
+from tactile_bayes.inference.point_load import PointLoadModel, default_priors, infer_point_load, predictive_p_value
 from tactile_bayes.mechanics.clamped_rod import base_curvature
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,10 +24,8 @@ ROUGH = SamplerSettings(ensembles=2, walkers=32, min_ess=300, max_r_hat=1.02)
 
 
 def integrated(force, arclength, compliance):
-    """Probe point in the clamp's frame, and base curvature, of a rod integrated from the contact back to the clamp.
-
-    At the contact the rod points along x, its curvature is zero, and a unit-stiffness rod obeys κ' = f cos φ backwards.
-    """
+    """Probe point in the clamp's frame, and base curvature, of a rod integrated from the contact back to the clamp. At
+    the contact the rod points along x, its curvature is zero, and a unit-stiffness rod obeys κ' = f cos φ backwards."""
 
     def rod(_, state):
         slope, curvature = state[2:]
@@ -224,9 +221,8 @@ def rms_over_range(tree):
 @pytest.mark.slow
 def test_a_real_whisker_is_a_large_deflection_rod(whisker):
     """Residual at the posterior mean at most 0.2 % of the sensor's range, and data that the posterior might have made.
-
-    The p-value of the sum of squares lies below 0.001 or above 0.999 in less than 2 of 1000 data sets from the model.
-    """
+    The p-value of the sum of squares lies below 0.001 or above 0.999 in less than 2 of 1000 data sets from the
+    model."""
     tree = infer_point_load(*whisker, rng=1)
     assert tree.attrs["converged"], tree.attrs["message"]
     assert rms_over_range(tree) < 0.002
@@ -256,9 +252,7 @@ def test_lesser_models_fit_a_real_whisker_worse(whisker, options, least, most):
 @pytest.mark.slow
 def test_posteriors_are_calibrated():
     """Simulation-based calibration: parameters from the prior, ranks in the posterior uniform (Kolmogorov-Smirnov).
-
-    Nine parameters at 1e-4 each: false alarm below 1e-3. What the rod cannot do is drawn again, as the prior has it.
-    """
+    Nine parameters at 1e-4 each: false alarm below 1e-3. What the rod cannot do is drawn again, as the prior has it."""
     axial, lateral = probe_points()
     rng = np.random.default_rng(8)
     priors = {

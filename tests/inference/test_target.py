@@ -4,7 +4,6 @@ import functools
 import itertools
 import pickle
 
-import emcee
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,17 +11,17 @@ from scipy import stats
 from scipy.special import logsumexp
 
 import tactile_bayes as tb
-from helpers.contour_posteriors import BRIEF, CELL, SOUND, measured, only, posterior
+from helpers.contour_posteriors import CELL, SOUND, measured, only, posterior
 from helpers.refusals import refused
+from tactile_bayes import Family, Rig, result, target
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_evidence import contour_evidence
-from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.stored_experiment import points_of
-from tactile_bayes.inference.target import Target, result, target
+from tactile_bayes.inference.evidence import contour_evidence
+from tactile_bayes.inference.experiment import points_of
+from tactile_bayes.inference.target import Target
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.report.reproduction import hindrances
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.rig_prior import RigPrior
 
 STATED = Rig(load_cell=CELL, unknown="nothing")
@@ -312,36 +311,6 @@ def test_a_grid_has_the_same_posterior_and_evidence():
     assert share < 0.9
     error = np.hypot(evidence.standard_error, np.sqrt((1.0 - share) / (share * 20_000)))
     assert abs(log_evidence - np.log(share) - evidence.log_evidence[1]) < 4.5 * error
-
-
-def test_emcee_has_the_same_posterior():
-    one, own, _ = two_unknowns()
-    sampler = emcee.EnsembleSampler(32, 2, one.log_probability, vectorize=True)
-    sampler.random_state = np.random.RandomState(1).get_state()
-    sampler.run_mcmc(one.start(1, 32), 400)
-    draws = sampler.get_chain(discard=100).swapaxes(0, 1).reshape(1, -1, 2)
-    back = result(one, draws, rng=1, sampler="emcee", settings=BRIEF)
-    effective = min(float(back["sample_stats"].ess_bulk.min()), SOUND.min_ess)
-    assert effective > 100.0
-    assert_same_mean(draws[0].mean(axis=0), own, effective)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::DeprecationWarning:dynesty")
-def test_dynesty_has_the_same_posterior_and_evidence():
-    import dynesty
-
-    one, own, evidence = two_unknowns()
-    sampler = dynesty.NestedSampler(
-        one.log_likelihood, one.prior_transform, 2, nlive=300, rstate=np.random.default_rng(1)
-    )
-    sampler.run_nested(print_progress=False)
-    found = sampler.results
-    back = result(one, found.samples_equal(np.random.default_rng(2))[None], rng=1, sampler="dynesty")
-    assert_same_mean(points_of(back, one.names)[0].mean(axis=0), own, SOUND.min_ess)
-    share = back["prior"].attrs["share_within_reach"]
-    error = np.hypot(evidence.standard_error, found.logzerr[-1])
-    assert abs(found.logz[-1] - np.log(share) - evidence.log_evidence[1]) < 4.5 * error
 
 
 def test_readings_have_densities_of_their_own():

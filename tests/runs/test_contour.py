@@ -11,8 +11,8 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import contact_points
 from tactile_bayes.inference.result import read_result
-from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs import contour as module

@@ -16,9 +16,8 @@ from tactile_bayes.diagnostics.inspection.inspection import Inspection, inspect_
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import ParameterError, RecordError, StudyError, TactileBayesError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.misfit import is_inferred
 from tactile_bayes.inference.parameters.unknowns import belongs
 from tactile_bayes.load_cell import LoadCell
@@ -111,10 +110,7 @@ def band_by_assumption(
 
 
 def alternatives_of(experiment: Experiment, seen: Inspection | None = None) -> list[Alternative]:
-    """Return the experiments that differ in one assumption, except those that the record cannot identify.
-
-    What an inspection of the record has seen is looked up if it is not given.
-    """
+    """Return the experiments that differ in one assumption, except those that the record cannot identify."""
     names, found = set(experiment.unknowns.names), []
     for group in _UNKNOWNS:
         members = {name for name in names if belongs(name, group)}

@@ -5,34 +5,82 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy import stats
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.assessment.assumptions import Alternative, alternatives_by_channel, alternatives_of, stated_cell
-from tactile_bayes.assessment.local_bends import PLACES, LocalBends, with_bends
+from tactile_bayes.contours import Contour, Smooth
+from tactile_bayes.contours.family import ContourFamily, FamilyParameter
 from tactile_bayes.diagnostics.findings import Finding, quantity
 from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.deadline import Deadline
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, contour_problem, experiment_of
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.result import best_draw
 from tactile_bayes.inference.starts.contour_optimum import cost_of_residuals, first_order, optimum_beside
-from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.record import COLUMNS, rod_of
 from tactile_bayes.record.rig_entry import rig_entries
 from tactile_bayes.rig.stated import stated_values
 
+# Slope angles at which a spot is sought, and standard deviation of its bell curve [rad].
+PLACES = tuple(np.linspace(-1.2, 1.2, 17).round(6).tolist())
+_WIDTH = 0.12
+_SPREAD = 0.6  # prior deviation of the change of log ρ, as that of a shape-free contour
+_NODES = Smooth.nodes(96)
+_LARGEST = 8.0  # bound on log ρ about its median; that of a parabola is infinite where it is upright
+_PARAMETER = FamilyParameter("change of the logarithm of the radius of curvature about a slope angle", 0)
+
+
+@dataclass(frozen=True)
+class LocalBends(ContourFamily):
+    """Contours of another family whose log ρ(α) has a bell curve more about each of some slope angles."""
+
+    family: ContourFamily
+    places: tuple[float, ...]
+    name: str = "local bends"
+
+    @cached_property
+    def bends(self) -> tuple[str, ...]:
+        """Names of the sizes of the bell curves: positive ones are flat spots, negative ones corners."""
+        return tuple(f"bend_{k + 1}" for k in range(len(self.places)))
+
+    @cached_property
+    def table(self) -> dict[str, FamilyParameter]:  # type: ignore[override]
+        return {**dict.fromkeys(self.bends, _PARAMETER), **self.family.table}
+
+    def build(self, *values: Any) -> Contour:
+        sizes = np.stack(np.broadcast_arrays(*values[: len(self.places)]), axis=-1)
+        drawn = self.family.build(*values[len(self.places) :])
+        with np.errstate(all="ignore"):
+            log_radius = np.log(np.asarray(drawn.radius_of_curvature(_NODES.reshape(-1, *[1] * len(drawn.shape)))))
+        log_radius = np.moveaxis(log_radius, 0, -1)
+        middle = np.nanmedian(log_radius, axis=-1, keepdims=True)
+        log_radius = np.clip(np.where(np.isnan(log_radius), middle, log_radius), middle - _LARGEST, middle + _LARGEST)
+        bells = np.exp(-0.5 * np.square((_NODES - np.array(self.places)[:, None]) / _WIDTH))
+        x, y = drawn.point(0.0)
+        return Smooth(log_radius + sizes @ bells, q=y, x_c=x)
+
+    def fit(self, x: Floats, y: Floats) -> dict[str, float]:
+        return {**dict.fromkeys(self.bends, 0.0), **self.family.fit(x, y)}
+
+
+def with_bends(model: ContourModel, places: tuple[float, ...]) -> ContourModel:
+    """Return the model whose contours may have a spot at each of some slope angles, of sizes that are unknown."""
+    family = LocalBends(model.family, places)
+    priors = {**dict.fromkeys(family.bends, stats.norm(0.0, _SPREAD)), **model.priors}
+    return ContourModel(model.measured, family, model.unknowns, model.noise, priors)
+
+
 COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
 _SECONDS = 120.0  # time limit of all searches [s], each of which takes about one
-# Least number of causes that are sought by a search, the likeliest to first order first; beyond them searches go on
-# until one describes the record.
-_FEWEST = 4
+_FEWEST = 4  # causes that are sought at least, the likeliest first; then until one describes the record
 _LEAST = 0.03  # share of the log-evidence of what describes the record below which, to first order, nothing is sought
 _MOST = 0.5  # least share of what any shape explains that one spot explains, to be named in its place
 _PRICE = float(np.log(len(PLACES)))  # of the places at which a spot is sought, in log-evidence

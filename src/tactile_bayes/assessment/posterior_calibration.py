@@ -29,15 +29,12 @@ from tactile_bayes.calibration.summary import coverage_p_value, summary
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem
-from tactile_bayes.inference.coordinates.base import in_coordinates
-from tactile_bayes.inference.densities import Proposal, flattened
+from tactile_bayes.inference.coordinates import in_coordinates
+from tactile_bayes.inference.densities import Proposal, approximate, flattened, refined
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
-from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.importance import approximate, refined
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, points_of, predicted_points
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.contour_start import Walk
-from tactile_bayes.inference.stored_experiment import points_of, predicted_points
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words, words
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS
@@ -82,13 +79,8 @@ class PosteriorExperiment(FieldsAlone):
     settings: SamplerSettings
 
     @cached_property
-    def model(self) -> ContourModel:
-        """Model of the record."""
-        return self.experiment.model
-
-    @cached_property
     def exact_model(self) -> ContourModel:
-        """The same with loads to full accuracy."""
+        """Model of the record with loads to full accuracy."""
         model = replace(self.experiment).model
         model.likelihood.exact = True
         return model
@@ -116,12 +108,8 @@ def posterior_calibration(
     workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Test whether the intervals of a posterior hold here: for truths drawn from it, and records predicted from them.
-
-    Each truth is inferred from the record and the predicted one together. If posterior and sampler are right, its rank
-    among the draws is uniform (posterior simulation-based calibration: Säilynoja, Schmitt, Bürkner & Vehtari 2025,
-    arXiv:2502.03279). In contrast to `calibrate`, truths are like the object and rig at hand. It is no test of the
-    assumptions, which are those of the simulation as well.
-    """
+    Each truth is inferred from the record and the predicted one together: if posterior and sampler are right, its rank
+    is uniform (Säilynoja, Schmitt, Bürkner & Vehtari 2025, arXiv:2502.03279). It is no test of the assumptions."""
     task = _task(posterior, experiment, replicates, probability, seed)
     with open_results_store(task.identity, out, REPLICATES) as store:
         kept = keep_outcomes(store, _replicate, task, replicates, workers=workers)
@@ -157,7 +145,7 @@ def _replicate(task: tuple[PosteriorExperiment, int]) -> Outcome:
 
 def _made(experiment: PosteriorExperiment, number: int) -> Outcome:
     for_start, for_posterior, for_ranks = child(experiment.seed, number).spawn(3)
-    model, rng = experiment.model, np.random.default_rng(for_ranks)
+    model, rng = experiment.experiment.model, np.random.default_rng(for_ranks)
     simulation = _simulation(experiment, number)
     joint = JointModel(model, replace(experiment.experiment, record=simulation.measured).model)
     walk = _walk(joint, experiment, for_start)
@@ -188,9 +176,9 @@ def _simulation(experiment: PosteriorExperiment, number: int) -> Simulation:
 def _walk(joint: JointModel, experiment: PosteriorExperiment, seed: np.random.SeedSequence) -> Walk:
     """Return the start of the walkers, from draws of the posterior weighted by the further readings."""
     rng, size = np.random.default_rng(seed), len(joint.names)
-    coordinates, ends = joint.coordinates, joint.walked_ends
+    coordinates, ends, of_record = joint.coordinates, joint.walked_ends, experiment.experiment.model
     target = in_coordinates(joint.log_probability, coordinates)
-    surplus = joint.log_probability(experiment.starts) - experiment.model.log_probability(experiment.starts)
+    surplus = joint.log_probability(experiment.starts) - of_record.log_probability(experiment.starts)
     if not np.isfinite(surplus).any():
         raise InferenceError("no draw of the posterior is possible together with a record that it predicts")
     fitted = Proposal.fitted(coordinates.of(experiment.starts), flattened(surplus, _LEAST_EFFECTIVE * size), ends)

@@ -11,7 +11,7 @@ from arviz_stats.base.array import array_stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.diagnostics.predictive_check import LOST_BELOW
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.stored_experiment import points_of
+from tactile_bayes.inference.experiment import points_of
 from tactile_bayes.uncertainty.band import contour_heights
 
 # Components that are scaled: the prior of the contour, that of rig and noise, and the likelihood.
@@ -21,14 +21,11 @@ _POWERS = (0.99, 1.01)
 
 
 def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapping[str, Floats]) -> xr.Dataset:
-    """Return how much the posterior changes if prior or likelihood is raised to a power near one.
+    """Return how much the posterior, and the band in regions of x, change if prior or likelihood is raised to a power.
 
-    The sensitivity is the cumulative Jensen–Shannon distance of the scaled posterior from the posterior, over the
-    change of the logarithm of the power, from Pareto-smoothed weights of the draws (Kallioinen, Paananen, Bürkner &
-    Vehtari 2024, doi 10.1007/s11222-023-10366-5); that of a band is the largest of its heights. Limits of reach have no
-    power, and do not count.
-
-    Shapes: regions (n,).
+    The sensitivity is the cumulative Jensen–Shannon distance over the change of the power's logarithm, from Pareto-
+    smoothed weights (Kallioinen, Paananen, Bürkner & Vehtari 2024, doi 10.1007/s11222-023-10366-5); of a band its
+    heights' largest.
     """
     points = points_of(posterior, model.names)
     every = posterior["sample_stats"].to_dataset()["lp"].transpose("chain", "draw").values

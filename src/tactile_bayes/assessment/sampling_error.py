@@ -17,13 +17,9 @@ WANTED_SHARE = 0.1  # Monte-Carlo error of an end over the width of the band, ab
 
 
 def sampling_error(posterior: xr.DataTree, x: ArrayLike, probability: float = 0.95) -> xr.Dataset:
-    """Return the Monte-Carlo standard errors of the ends of a band, and the draws for an error of a tenth of the band.
-
-    Errors of quantiles follow from the effective sample size of the indicator of a quantile (Vehtari et al. 2021, doi
-    10.1214/20-BA1221), with an ensemble as a chain.
-
-    Shapes: x (n,).
-    """
+    """Return Monte-Carlo standard errors of the ends of a band at x, (n,), and the draws for a tenth of the band. By
+    the effective sample size of a quantile (Vehtari et al. 2021, doi 10.1214/20-BA1221), with an ensemble as a
+    chain."""
     at, (low, middle, high) = grid_points(x), central_levels(probability)
     chains = contour_draws(posterior).sizes["chain"]
     heights = contour_heights(posterior, at)

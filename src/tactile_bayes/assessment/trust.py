@@ -22,9 +22,9 @@ from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.diagnostics.result_check import probability_of
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.experiment import experiment_of
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import contour_draws, read_result
-from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.tasks import TaskProgress, Workers, workers_of

@@ -19,8 +19,8 @@ from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import CalibrationError, InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.experiment import contact_points
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.tasks import Kind
 from tactile_bayes.uncertainty.band import contour_band

@@ -14,11 +14,10 @@ from tactile_bayes.checks import check_numbers, check_optional, check_probabilit
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, contour_problem
 from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.rig import Rig

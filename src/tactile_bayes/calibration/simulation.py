@@ -14,8 +14,8 @@ from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.corruption import corrupted_angles
 from tactile_bayes.record import CHANNELS, bases_of, rod_of

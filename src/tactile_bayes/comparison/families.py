@@ -20,14 +20,12 @@ from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.evidence import WIDTHS, Evidence, contour_evidence
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.parameters.priors import matched_priors
-from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
+from tactile_bayes.inference.parameters.priors import matched_priors, refuse_other_rig
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.numerics.random_numbers import Rng, spawn
 from tactile_bayes.numerics.selection import evenly_spread
@@ -58,7 +56,7 @@ class _Tried(NamedTuple):
 
     ceiling: float  # largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed
     draws: Draws | None = None
-    evidence: ContourEvidence | None = None  # None also where it cannot be computed from the draws
+    evidence: Evidence | None = None  # None also where it cannot be computed from the draws
     predicted: LeftOut | None = None
     p_value: float = np.nan
     passed: bool = False

@@ -19,10 +19,9 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem
-from tactile_bayes.inference.densities import effective_number
+from tactile_bayes.inference.densities import LARGEST_K, effective_number, pareto_smoothed, weighed
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
-from tactile_bayes.inference.importance import LARGEST_K, pareto_smoothed, weighed
+from tactile_bayes.inference.experiment import ContourProblem
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 

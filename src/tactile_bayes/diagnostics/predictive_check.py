@@ -11,8 +11,8 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import FEWEST_PREDICTIONS
+from tactile_bayes.inference.experiment import segments_of
 from tactile_bayes.inference.result import posterior_draws, record_of, refuse_no_contour, refuse_not_finite
-from tactile_bayes.inference.stored_experiment import segments_of
 from tactile_bayes.load_cell.blocks import are_blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of

@@ -8,7 +8,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.stored_experiment import experiment_of, points_of
+from tactile_bayes.inference.experiment import experiment_of, points_of
 from tactile_bayes.numerics.selection import evenly_spread
 
 _FEW, _DRAWS = 40, 200  # number of draws that are displaced, and if one of them is then out of reach

@@ -17,14 +17,13 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem, identity_of
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, settings_of
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, contour_problem, identity_of
 from tactile_bayes.inference.family import Family, Gauge
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.parameters.rig_prior import rig_prior
+from tactile_bayes.inference.parameters.priors import rig_prior
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
@@ -243,7 +242,7 @@ def sampled(
             # A run that resumes from a checkpoint must start at the same points, whatever the time limit was.
             problem, walk = _likeliest(problem, seeds[0], settings, NEVER if checkpoint is not None else deadline)
         model = problem.model
-        _refuse_beyond(model, walk)
+        refuse_beyond(model, walk)
         is_brief = walk.is_hopeless and settings.max_steps is None
         steps = _STEPS_OF_A_VERDICT if is_brief else settings.max_steps
         draws = sample(
@@ -274,14 +273,7 @@ def sampled(
     return Sampled(whole, draws, walk.coordinates)
 
 
-def started(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Walk:
-    """Return the start of walkers in the posterior of a model."""
-    walk = walk_of(model, seed, settings)
-    _refuse_beyond(model, walk)
-    return walk
-
-
-def _refuse_beyond(model: ContourModel, walk: Walk) -> None:
+def refuse_beyond(model: ContourModel, walk: Walk) -> None:
     """Refuse a start whose parameters fit the record far better beyond the ends of their priors."""
     if walk.beyond:
         raise InferenceError(

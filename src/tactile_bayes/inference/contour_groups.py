@@ -20,8 +20,7 @@ from tactile_bayes.record.origin import with_origin
 from tactile_bayes.rig.parameters import parameter_named
 
 _KEPT_DRAWS = 250  # largest number of draws of each chain for which predictions and events are stored
-# Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
-# 2,700 samples on.
+# Largest number of values in predictions and log-likelihoods, 128 MB: fewer draws are stored from 2,700 samples on.
 _STORED_NUMBERS = 16_000_000
 FEWEST_PREDICTIONS = 100  # least number of predictions that the check of the record requires
 _PATHS = 200  # number of contours whose paths are followed at a time
@@ -33,20 +32,15 @@ _BY_SAMPLE = (*_BY_DRAW, "sample")
 def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
     """Return the groups that are known when sampling ends: draws, statistics of the ensembles, and the record."""
     record = model.measured.assign({name: with_origin(model.measured[name]) for name in (*CHANNELS, "drive_angle")})
+    log_prior = model.log_prior(draws.samples.reshape(-1, len(model.names))).reshape(draws.log_probability.shape)
+    coords = {"chain": np.arange(len(log_prior)), "draw": np.arange(draws.samples.shape[1])}
     return {
         "posterior": _labelled(model, draws.samples, np.arange(draws.samples.shape[1])),
         "sample_stats": sample_stats(draws),
-        "log_prior": _log_prior(model, draws),
+        "log_prior": xr.Dataset({"prior": (_BY_DRAW, log_prior)}, coords),
         "observed_data": xr.Dataset({name: record[name] for name in CHANNELS}),
         "constant_data": record.drop_vars(CHANNELS).drop_attrs(deep=False),
     }
-
-
-def _log_prior(model: ContourModel, draws: Draws) -> xr.Dataset:
-    """Return the logarithm of the prior density of every draw, without the exclusion of contours out of reach."""
-    values = model.log_prior(draws.samples.reshape(-1, len(model.names))).reshape(draws.log_probability.shape)
-    coords = {"chain": np.arange(len(values)), "draw": np.arange(draws.samples.shape[1])}
-    return xr.Dataset({"prior": (_BY_DRAW, values)}, coords=coords)
 
 
 def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
@@ -107,7 +101,7 @@ def _events(model: ContourModel, draws: Draws, kept: Index) -> xr.Dataset:
         values = np.concatenate([event[name] for event in found]).reshape(chains, kept.size, -1)
         what = name.removeprefix("first_").removeprefix("snap_off_")
         column = COLUMNS["base_x" if what == "travel" else what]
-        variables[name] = (("chain", "draw", "segment"), values, {"units": column.unit_in(units)})
+        variables[name] = ((*_BY_DRAW, "segment"), values, {"units": column.unit_in(units)})
     sides = np.where(model.likelihood.segments.backward, "backward", "forward")
     return xr.Dataset(variables, coords={"chain": np.arange(chains), "draw": kept, "segment": sides})
 
@@ -130,8 +124,7 @@ def _labelled(model: ContourModel, samples: Floats, draw: Index) -> xr.Dataset:
     columns = {name: samples[..., i] for i, name in enumerate(model.names)}
     if isinstance(model.family, PartlyKnown):
         columns |= {name: np.full(samples.shape[:2], value) for name, value in model.family.known.items()}
-    labelled = {n: (("chain", "draw"), values, {"units": unit_of(model, n)}) for n, values in columns.items()}
-    return xr.Dataset(labelled, coords=coords)
+    return xr.Dataset({n: (_BY_DRAW, values, {"units": unit_of(model, n)}) for n, values in columns.items()}, coords)
 
 
 def unit_of(model: ContourModel, name: str) -> str:

@@ -15,13 +15,12 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, log_density_of, quantiles_of, support_of
 from tactile_bayes.errors import ParameterError, ReachError
-from tactile_bayes.inference.coordinates.base import Logarithms
+from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import Ends
 from tactile_bayes.inference.parameters.noise import Noise
-from tactile_bayes.inference.parameters.unknowns import Unknowns
+from tactile_bayes.inference.parameters.unknowns import RigValues, Unknowns
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.numerics.blocks import blocks
@@ -36,12 +35,9 @@ _FEWEST_TRIALS = 1000  # draws of the prior before none within reach is an error
 
 
 class ContourModel:
-    """Prior times likelihood, as a function of arrays of parameters, in the record's units.
-
-    Points, (n, d), have the parameters `names`: of the contour, the rig (both are `forward_parameters`), the noise, and
-    a discrepancy. `of_path` are the columns of those that move samples along the path; `zero` (NaN if unknown) and
-    `deviation` are those of each channel [EI/L, EI/L²].
-    """
+    """Prior times likelihood, as a function of arrays of parameters, in the record's units. Points, (n, d), have the
+    parameters `names`: of the contour and the rig (both are `forward_parameters`), the noise, a discrepancy. `of_path`
+    are columns that move samples on the path; `zero` and `deviation` are by channel."""
 
     def __init__(
         self,

@@ -1,9 +1,9 @@
-"""The integral of a density, as of prior times likelihood, from draws, by bridge sampling."""
+"""The evidence of a family of contours, and the integral of any density from draws, by bridge sampling."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from arviz_stats.base.array import array_stats
@@ -12,7 +12,11 @@ from scipy.special import expit, log_expit, ndtr
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.densities import Proposal, effective_number, normalised
+from tactile_bayes.inference.contour import Sampled
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.coordinates import in_coordinates
+from tactile_bayes.inference.densities import Proposal, effective_number, normalised, weighed
+from tactile_bayes.inference.parameters.priors import widened
 
 _KNOTS = np.linspace(-2.0, 2.0, 7)  # of normal scores: more would follow noise, fewer would not resolve hard bounds
 _PROPOSALS = 4000  # for a standard error of 0.01 to 0.04
@@ -27,7 +31,7 @@ _ROUNDS = 2  # for the effective number of draws, which hardly depends on the th
 class Evidence(NamedTuple):
     """The logarithm of an integral, with its standard error and overlap."""
 
-    log_evidence: float
+    log_evidence: Any  # a number, or, of a contour, an array with one for each of `WIDTHS`
     standard_error: float  # of `log_evidence`
     # ∫ p q/(s p + (1 − s) q) of the density p and the proposal density q, both normalised, with s the share of draws of
     # p: 1 if both are the same, 0 if they are disjoint. Below some 0.1, the standard error is not reliable.
@@ -42,17 +46,13 @@ def bridge_evidence(
     *,
     proposals: int = _PROPOSALS,
 ) -> Evidence:
-    """Return the logarithm of the integral of a density, from draws (chains, n, d), walker-major, and their values.
+    """Return the logarithm of the integral Z of a density f, from draws (chains, n, d), walker-major, and their values.
 
-    With density f = Z p and draws of p and of a normalised density q like it,
-
-        Z = E_q[f h]/E_p[q h],  h = 1/(s f/Z + (1 − s) q),  s = n/(n + m),
-
-    for n effective draws of p and m of q (Meng & Wong 1996, Statistica Sinica 6, 831; Gronau et al. 2017, doi
-    10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the other, and vice versa: a
-    comparison with the fitted draws is biased (Overstall & Forster 2010, doi 10.1016/j.csda.2010.03.008). The error has
-    both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with autocorrelation; in tens of
-    dimensions it is up to a quarter too large. Neither t distributions nor Warp-III gained anything.
+    For n effective draws of f/Z and m of a density q that is fitted to the other half of the chains (a comparison with
+    the fitted draws is biased: Overstall & Forster 2010, doi 10.1016/j.csda.2010.03.008), Z = E_q[f h]/E_p[q h], h =
+    1/(s f/Z + (1 − s) q), s = n/(n + m) (Meng & Wong 1996, Statistica Sinica 6, 831). The error has both terms of
+    Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x); in tens of dimensions it is up to a quarter too
+    large. Neither t distributions nor Warp-III gained anything.
     """
     count = proposals // 2
     _refuse_few(draws)
@@ -98,10 +98,8 @@ def _fitted(points: Floats) -> _ScoreFit:
 
 
 class _ScoreFit:
-    """A normal distribution of normal scores along the columns of `axes`, (d, d), fitted to points, (n, d).
-
-    Scores are piecewise linear in the place along an axis, for hard bounds and skewness.
-    """
+    """A normal distribution, fitted to points, (n, d), of their normal scores along the columns of `axes`, (d, d).
+    Scores are piecewise linear in the place along an axis, for hard bounds and skewness."""
 
     def __init__(self, points: Floats, axes: Floats) -> None:
         self._centre, self._axes, self._back = points.mean(axis=0), axes, np.linalg.inv(axes)
@@ -158,11 +156,8 @@ class _Bridge(NamedTuple):
 
 
 def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
-    """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,).
-
-    The sums of logistic functions over both are equal at the threshold log Z + log(m/n) (Bennett 1976, doi
-    10.1016/0021-9991(76)90078-4).
-    """
+    """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,). At the
+    threshold log Z + log(m/n) both sums are equal (Bennett 1976, doi 10.1016/0021-9991(76)90078-4)."""
     if not np.any(np.isfinite(proposed)):
         raise InferenceError(
             "density and fit do not overlap: the density is zero at all proposals; its walls may leave little of the "
@@ -177,7 +172,8 @@ def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
             raise InferenceError(
                 "density and fit do not overlap: few points dominate it; do all chains sample the same place?"
             )
-        used, effective = effective, _effective_size(from_draws)
+        ess: float = array_stats.ess(from_draws, chain_axis=0, draw_axis=1, method="mean")
+        used, effective = effective, float(min(ess, drawn.size))
     return _Bridge(
         threshold + float(np.log(used / proposed.size)),
         threshold,
@@ -198,12 +194,6 @@ def _threshold(drawn: Floats, proposed: Floats, effective: float) -> float:
     return float(brentq(difference, finite.min() - margin, finite.max() + margin, maxiter=1000))
 
 
-def _effective_size(terms: Floats) -> float:
-    """Return the effective sample size of terms, shape (chains, n), from their autocorrelation."""
-    ess: Callable[..., float] = array_stats.ess
-    return float(min(ess(terms, chain_axis=0, draw_axis=1, method="mean"), terms.size))
-
-
 def _correlation(both: tuple[Floats, Floats], halves: tuple[slice, slice]) -> float:
     """Return the correlation of two terms of the same draws, shape (chains, n), within halves; 0 if negative."""
     a, b = (np.concatenate([(terms[half] - terms[half].mean()).ravel() for half in halves]) for terms in both)
@@ -220,3 +210,37 @@ def _refuse_few(draws: Floats) -> None:
             f"{chains} chains of {each} draws of {size} parameters: give at least 2 chains, and of {max(chains, 2)} "
             f"chains at least {least} draws each, many more if they are correlated"
         )
+
+
+WIDTHS = (0.5, 1.0, 2.0)  # factors on the widths of the priors of sizes, exponents, amplitude and length scale
+_POSTERIOR_DRAWS = 8000  # that are used, evenly spread, since neighbours add little
+_PRIOR_DRAWS, _OTHER_DRAWS = 4000, 1000  # for the share within reach, with the prior and with one of another width
+
+
+def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> Evidence:
+    """Return the evidence of a model, over contours within reach; with priors of other widths by importance weights."""
+    coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
+    kept = sampled.draws.evenly(_POSTERIOR_DRAWS // chains)
+    points = sampled.draws.samples[:, kept].reshape(-1, size)
+    transformed = coordinates.of(points)
+    _, growth = coordinates.parameters(transformed)
+    bridge = bridge_evidence(
+        in_coordinates(model.log_probability, coordinates),
+        transformed.reshape(chains, -1, size),
+        sampled.draws.log_probability[:, kept] + growth.reshape(chains, -1),
+        rng,
+    )
+    own = {name: model.priors[name] for name in model.family.parameters}
+    logs, share = [], 0.0
+    for width in WIDTHS:
+        others = widened(own, width)
+        change = np.zeros(len(points))
+        for name, prior in others.items():
+            if prior is not own[name]:
+                values = points[:, model.names.index(name)]
+                change += prior.logpdf(values) - own[name].logpdf(values)
+        reached = model.share_within_reach(rng, _PRIOR_DRAWS if width == 1.0 else _OTHER_DRAWS, others)
+        share = reached if width == 1.0 else share
+        logs.append(bridge.log_evidence + weighed(change)[1] - np.log(reached))
+    error = np.hypot(bridge.standard_error, np.sqrt((1.0 - share) / (share * _PRIOR_DRAWS)))
+    return Evidence(np.array(logs), float(error), bridge.overlap)

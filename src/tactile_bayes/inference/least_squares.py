@@ -49,10 +49,8 @@ def optima(
     high: Floats | float = np.inf,
     deadline: Deadline = NEVER,
 ) -> Iterator[Optimum]:
-    """Yield robust least-squares optima, one from each candidate, (d,).
-
-    A search may pass through points that are a priori impossible; if it ends at one, it is repeated within the bounds.
-    """
+    """Yield robust least-squares optima, one from each candidate, (d,). A search may pass through points that are a
+    priori impossible; if it ends at one, it is repeated within the bounds."""
     for candidate in candidates:
         found = descend(residuals, candidate, middle, spread, deadline=deadline)
         gain = np.inf
@@ -81,10 +79,8 @@ def descend(
     high: Floats | float = np.inf,
     deadline: Deadline = NEVER,
 ) -> Optimum:
-    """Return the robust least-squares optimum from one starting point, in units of `spread`.
-
-    Of the record's squared residuals z in units of the threshold the loss is 2 (√(1 + z) − 1); of the priors' it is z.
-    """
+    """Return the robust least-squares optimum from one starting point, in units of `spread`. Of the record's squared
+    residuals z in units of the threshold the loss is 2 (√(1 + z) − 1); of the priors' it is z."""
 
     def one(point: Floats) -> Floats:
         return np.append(residuals((point * spread)[None])[0], point - middle / spread)

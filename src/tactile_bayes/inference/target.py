@@ -15,25 +15,26 @@ from threadpoolctl import threadpool_limits
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_array, check_kind, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.contour import started
+from tactile_bayes.inference.contour import refuse_beyond
 from tactile_bayes.inference.contour_groups import unit_of, whole_groups
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, settings_of
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import ContourProblem, Experiment, contour_problem
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import OTHER, provenance
+from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, spawn
 from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.tasks import FieldsAlone
 
 _REPEATS = 3  # of a measurement of time, of which the shortest counts
 _LEAST, _LARGEST = 2.0**-54, 1.0 - 2.0**-53  # probabilities at which quantiles are finite
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class Target(FieldsAlone):
     """Prior and likelihood of a contour, the rig and the noise, given a record: see `tactile_bayes.target`.
 
     Points are arrays of shape (..., parameters), in the order of `names` and the record's units; a density has their
@@ -43,9 +44,6 @@ class Target:
     """
 
     experiment: Experiment
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"experiment": self.experiment}
 
     def __repr__(self) -> str:
         samples = self.model.measured.sizes["sample"]
@@ -77,50 +75,21 @@ class Target:
         return np.stack([self.model.ends.low, self.model.ends.high], axis=1)
 
     def log_prior(self, points: ArrayLike) -> Floats:
-        """Return the logarithm of the prior density, −inf out of bounds.
+        """Return the natural logarithm of the prior density of points, −inf out of bounds.
 
         It is that of all contours: its integral over those within reach is the share of these.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., parameters)
-            Parameters.
-
-        Returns
-        -------
-        array, shape (...)
-            Natural logarithms.
         """
         return self._within(points, self.model.log_prior)
 
     def log_likelihood(self, points: ArrayLike) -> Floats:
-        """Return the logarithm of the likelihood, −inf out of bounds and for contours out of reach.
+        """Return the natural logarithm of the likelihood of points, −inf out of bounds and out of the rod's reach.
 
-        Parameters
-        ----------
-        points : array_like, shape (..., parameters)
-            Parameters.
-
-        Returns
-        -------
-        array, shape (...)
-            Natural logarithms; loads count in EI/L and EI/L².
+        It is the density of loads in EI/L and EI/L².
         """
         return self._within(points, self.model.log_likelihood)
 
     def log_probability(self, points: ArrayLike) -> Floats:
-        """Return the logarithm of prior times likelihood, −inf where either is zero.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., parameters)
-            Parameters.
-
-        Returns
-        -------
-        array, shape (...)
-            Natural logarithms.
-        """
+        """Return the natural logarithm of prior times likelihood of points, −inf where either is zero."""
         return self._within(points, self.model.log_probability)
 
     def prior_transform(self, cube: ArrayLike) -> Floats:
@@ -175,7 +144,8 @@ class Target:
         count = SamplerSettings().walkers_for(size) if walkers is None else check_whole_number("walkers", walkers, 1)
         settings = SamplerSettings(ensembles=2, walkers=2 * max(size, -(-count // 2)))
         with threadpool_limits(1):
-            walk = started(self.model, seed_sequence(rng), settings)
+            walk = walk_of(self.model, seed_sequence(rng), settings)
+        refuse_beyond(self.model, walk)
         return walk.coordinates.parameters(walk.start.reshape(-1, size))[0][:count]
 
     def seconds(self, points: ArrayLike) -> float:

@@ -15,8 +15,7 @@ from scipy import stats
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.densities import Proposal, effective_number
-from tactile_bayes.inference.importance import weighed
+from tactile_bayes.inference.densities import Proposal, effective_number, weighed
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.random_numbers import Seed, words

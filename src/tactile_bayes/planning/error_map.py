@@ -28,8 +28,8 @@ from tactile_bayes.checks import (
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import ContourError, InferenceError, ReachError, StudyError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import contour_problem
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, Seed, child, seed_sequence, seed_words

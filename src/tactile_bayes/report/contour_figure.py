@@ -11,7 +11,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.stored_experiment import found_rig
+from tactile_bayes.inference.experiment import found_rig
 from tactile_bayes.plotting.maps import contacts_within
 from tactile_bayes.record import bases_of, carried_sweeps
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend

@@ -12,8 +12,8 @@ import xarray as xr
 from tactile_bayes.assessment.trust import draws_digest
 from tactile_bayes.diagnostics.result_check import Check, budget_if_any, check, probability_of
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.experiment import contact_points
 from tactile_bayes.inference.result import read_result, record_of
-from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.load_cell.zero_load import quiet_zero_load
 from tactile_bayes.record import record_hash
 from tactile_bayes.record.netcdf import read_netcdf

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.inference.experiment import likelihood_of
 from tactile_bayes.inference.result import best_draw, record_of
-from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.record import loads_of, rod_of, rows_of_sweeps

@@ -11,7 +11,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.stored_experiment import segments_of
+from tactile_bayes.inference.experiment import segments_of
 from tactile_bayes.plotting.drive_axis import drive_axis
 from tactile_bayes.plotting.maps import outline
 from tactile_bayes.record import CHANNELS, bases_of, carried_sweeps, frame_of, present_channels, travels_of, turned

@@ -18,8 +18,8 @@ from markupsafe import Markup
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.result_check import check, probability_of
 from tactile_bayes.errors import InferenceError, ParameterError, TactileBayesError
+from tactile_bayes.inference.experiment import contact_points
 from tactile_bayes.inference.result import record_of
-from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.report.findings import contour_posterior
 from tactile_bayes.report.overlay import DISTANCE_HEADS, Laid, distance_cells, note_of

@@ -9,8 +9,8 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.inference.experiment import contact_points
 from tactile_bayes.inference.result import record_of
-from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.report.contour_figure import ContourFindings, contour_figure
 from tactile_bayes.report.meanings import is_direction
 from tactile_bayes.report.page import parameter_cells

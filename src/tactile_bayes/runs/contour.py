@@ -25,9 +25,9 @@ from tactile_bayes.diagnostics.result_check import Check, check
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
+from tactile_bayes.inference.experiment import contact_points
 from tactile_bayes.inference.family import family_of
 from tactile_bayes.inference.result import best_draw, known_of, posterior_draws, record_of, write_result
-from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod

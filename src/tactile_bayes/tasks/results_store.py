@@ -131,12 +131,12 @@ def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]
     return outcomes
 
 
-def differences(there: Mapping[str, str], here: Mapping[str, str]) -> str:
+def differences(there: Mapping[str, str], here: Mapping[str, str], most: int = 3) -> str:
     """Return in words what differs between the identities of a stored thing and of the one asked for; "" if nothing."""
     differ = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-    parts = ((name, *_differing(there.get(name), here.get(name))) for name in differ[:3])
+    parts = ((name, *_differing(there.get(name), here.get(name))) for name in differ[:most])
     named = ", ".join(f"{name} is {had} there and {has} here" for name, had, has in parts)
-    return named + (f" and {len(differ) - 3} more" if len(differ) > 3 else "")
+    return named + (f" and {len(differ) - most} more" if len(differ) > most else "")
 
 
 def _differing(there: Any, here: Any) -> tuple[str, ...]:

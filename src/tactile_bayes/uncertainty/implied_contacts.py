@@ -11,10 +11,10 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contact_posterior.posterior import groups_of_contacts
 from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.inference.experiment import likelihood_of
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.result import contour_draws, library, posterior_draws, record_of
-from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.numerics.blocks import blocks

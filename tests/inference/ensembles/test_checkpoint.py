@@ -1,10 +1,6 @@
 """Runs that are killed, stopped or ended, and go on from what is on disk."""
 
 import json
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -13,8 +9,9 @@ import numpy as np
 import pytest
 
 from helpers.refusals import refused
+from tactile_bayes import SamplerSettings
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, checkpoint, sample
+from tactile_bayes.inference.ensembles import Draws, checkpoint, sample
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
 STEADY = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=4000, min_ess=200, max_r_hat=1.05)
@@ -99,45 +96,6 @@ def test_a_run_goes_on_bit_by_bit_wherever_it_was_killed(tmp_path, calls):
     target = Counted()
     assert_same(draw(tmp_path, target=target), whole())
     assert target.calls == 2 * (SMALL.max_steps - made) + (0 if made else 2)
-
-
-# A process that samples as `draw` does, and waits amid the second block.
-CHILD = """
-import sys, time
-import numpy as np
-from tactile_bayes.inference.ensembles import SamplerSettings, checkpoint, sample
-
-checkpoint._SECONDS = 0.0
-calls = 0
-
-def target(x):
-    global calls
-    calls += 1
-    if calls > 30:
-        time.sleep(600.0)
-    return -0.5 * (x[:, 0] ** 2 + (x[:, 1] - np.abs(x[:, 0])) ** 2)
-
-settings = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
-start = 2.0 * np.random.default_rng(0).normal(size=(2, 8, 2))
-sample(target, start, names=["a", "b"], seed=3, settings=settings, checkpoint=sys.argv[1])
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
-@pytest.mark.slow
-def test_a_process_that_is_killed_leaves_a_whole_state(tmp_path):
-    """SIGKILL amid the second block; as long as the process is there, no other run gets in."""
-    folder = tmp_path / "run"
-    with subprocess.Popen([sys.executable, "-c", CHILD, str(folder)]) as process:
-        while not (folder / "checkpoint.npz").exists():
-            assert process.poll() is None
-            time.sleep(1e-2)
-        with refused(InferenceError, "another run"):
-            draw(folder)
-        process.kill()
-    assert process.returncode == -signal.SIGKILL
-    assert steps_in(folder) == 10
-    assert_same(draw(folder), whole())
 
 
 @pytest.mark.slow
@@ -234,16 +192,16 @@ def begun(tmp_path):
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        ({"identity": {**SAME, "model": "circle"}}, ["model (was 'parabola', now 'circle')"]),
-        ({"identity": {"model": "parabola"}}, ["data", "now not stated"]),
-        ({"identity": {**SAME, "rod": "1"}}, ["rod (was not stated, now '1')"]),
-        ({"seed": 4}, ["seed of the ensembles (was '3, pool of 4', now '4, pool of 4')"]),
-        ({"seed": OTHER_SEED}, ["now '3, spawn key (1,), pool of 4'"]),
-        ({"names": ("a", "c")}, ["names of parameters (was 'a, b', now 'a, c')"]),
+        ({"identity": {**SAME, "model": "circle"}}, ["model is parabola there and circle here"]),
+        ({"identity": {"model": "parabola"}}, ["data", "left out here"]),
+        ({"identity": {**SAME, "rod": "1"}}, ["rod is left out there and 1 here"]),
+        ({"seed": 4}, ["seed of the ensembles is 3, pool of 4 there and 4, pool of 4 here"]),
+        ({"seed": OTHER_SEED}, ["3, spawn key (1,), pool of 4 here"]),
+        ({"names": ("a", "c")}, ["names of parameters is a, b there and a, c here"]),
         ({"scale": 3.0}, ["starting points"]),
         ({"settings": replace(SMALL, block_steps=20)}, ["block_steps"]),
-        ({"settings": replace(SMALL, walkers=10)}, ["walkers of an ensemble (was '8', now '10')"]),
-        ({"settings": replace(SMALL, ensembles=3)}, ["number of ensembles (was '2', now '3')"]),
+        ({"settings": replace(SMALL, walkers=10)}, ["walkers of an ensemble is 8 there and 10 here"]),
+        ({"settings": replace(SMALL, ensembles=3)}, ["number of ensembles is 2 there and 3 here"]),
     ],
 )
 def test_another_run_is_refused_with_what_differs(begun, change, named):
@@ -252,12 +210,6 @@ def test_another_run_is_refused_with_what_differs(begun, change, named):
 
 def test_an_integer_and_its_sequence_are_one_seed(begun):
     assert draw(begun, identity=SAME, seed=np.random.SeedSequence(3)).steps_run == 60
-
-
-def test_a_long_entry_is_shown_where_it_differs(tmp_path):
-    priors = "; ".join(f"parameter {i} uniform" for i in range(20))
-    draw(tmp_path, settings=replace(SMALL, max_steps=10), identity={"priors": priors})
-    refuse(tmp_path, "11 uniform", "11 normal", "…", identity={"priors": priors.replace("11 uniform", "11 normal")})
 
 
 ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 2, "steps": 0}
@@ -272,8 +224,8 @@ ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 2, "steps": 0}
         ({"text": '{"kind": "weights", "format": 1}'}, "'weights'"),
         ({"text": json.dumps(ENSEMBLES | {"format": 3})}, "format 3"),
         ({"text": json.dumps(ENSEMBLES | {"identity": []})}, "damaged"),
-        ({"text": json.dumps(ENSEMBLES | {"identity": {}})}, "was not stated"),
-        ({"identity": SAME | {"version of emcee": "3.1.5"}}, "version of emcee (was '3.1.5'"),
+        ({"text": json.dumps(ENSEMBLES | {"identity": {}})}, "left out there"),
+        ({"identity": SAME | {"version of emcee": "3.1.5"}}, "version of emcee is 3.1.5 there"),
         ({"steps": 33}, "after 15 steps"),
     ],
 )
@@ -319,16 +271,3 @@ def test_one_folder_is_for_one_run_at_a_time(tmp_path):
 
     assert draw(tmp_path, progress=other).steps_run == 10
     assert draw(tmp_path).steps_run == 60
-
-
-def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
-    draw(tmp_path, settings=replace(SMALL, max_steps=20))
-
-    def full(path):
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(checkpoint, "write_atomically", full)
-        with pytest.raises(OSError, match="No space left"):
-            draw(tmp_path)
-    assert_same(draw(tmp_path), whole())

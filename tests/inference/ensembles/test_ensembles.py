@@ -1,4 +1,6 @@
-"""The emcee driver against targets whose answer is known."""
+"""The emcee driver against targets whose answer is known: convergence, modes, and the steps that are kept."""
+
+import json
 
 import numpy as np
 import pytest
@@ -7,9 +9,13 @@ from scipy.signal import lfilter
 
 from helpers.interrupts import interrupted_at
 from helpers.refusals import refused
+from tactile_bayes import SamplerSettings
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, diagnosis, sample, scatter_walkers
-from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time, walker_major
+from tactile_bayes.inference.coordinates import Coordinates, Logarithms
+from tactile_bayes.inference.ensembles import Draws, Progress, diagnosis, run_state, sample, scatter_walkers
+from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time, modes_of, walker_major
+from tactile_bayes.inference.ensembles.run_state import Block, RunState
+from tactile_bayes.inference.result import sample_stats
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=40)
 
@@ -179,12 +185,6 @@ def test_a_log_probability_that_is_no_number_is_refused_with_the_point(bad, caps
     assert printed.out == printed.err == ""
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, None, True])
-def test_bad_seeds_are_refused(seed):
-    with refused(ParameterError, rng=seed):
-        draw_from(standard, 2, settings=SMALL, seed=seed)
-
-
 def test_walkers_of_a_target():
     assert SamplerSettings().walkers_for(2) == 48
     assert SamplerSettings().walkers_for(15) == 90
@@ -209,3 +209,172 @@ def test_scattered_walkers_lie_inside_and_differ():
     np.testing.assert_array_equal(start, again)
     with refused(InferenceError, "0 of 1000"):
         scatter_walkers(lambda x: np.full(len(x), -np.inf), wide, parameters=2, seed=1, settings=settings)
+
+
+MODES = np.array([[-50.0, 3.0], [50.0, 3.0]])
+
+
+def two_modes(x):
+    """Normal distributions of sd 1 around (±50, 3), one of twice the weight; no proposal finds the other."""
+    near = -0.5 * ((x[:, None] - MODES) ** 2).sum(axis=-1)
+    return np.logaddexp(near[:, 0], near[:, 1] + np.log(2.0))
+
+
+def run(log_probability, centres, *, scale, steps, parameters=2, seed=1, walkers=16) -> Draws:
+    settings = SamplerSettings(ensembles=4, walkers=walkers, block_steps=steps, max_steps=steps)
+    numbers = np.random.default_rng(seed).normal(size=(4, walkers, parameters))
+    names = [f"x{i}" for i in range(parameters)]
+    start = scale * numbers + np.asarray(centres)
+    return sample(log_probability, start, names=names, seed=seed, settings=settings)
+
+
+def test_modes_that_no_proposal_crosses_are_reported():
+    centres = MODES[[0, 1, 1, 0]][:, None]
+    draws = run(two_modes, centres, scale=1.0, steps=400)
+    assert not draws.converged
+    first, second = draws.modes
+    assert (first.ensembles, second.ensembles) == ((0, 3), (1, 2))
+    assert list(first.values) == list(second.values) == ["x0"]  # and not x1, which is 3 in both
+    assert first.values["x0"] == pytest.approx(-50.0, abs=0.5)
+    assert second.values["x0"] == pytest.approx(50.0, abs=0.5)
+    assert second.log_probability - first.log_probability == pytest.approx(np.log(2.0), abs=0.5)
+    assert "ensembles sit in 2 modes" in draws.message
+    stored = json.loads(sample_stats(draws).attrs["places"])
+    assert [mode["ensembles"] for mode in stored] == [list(mode.ensembles) for mode in draws.modes]
+    assert "ensembles 0, 3 near x0 = -" in draws.message
+
+
+def test_three_modes_in_two_directions():
+    rng = np.random.default_rng(1)
+    centres = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 20.0], [0.0, 0.0]])
+    samples = rng.normal(size=(4, 100, 8, 2)) + centres[:, None, None]
+    modes = modes_of(samples, np.zeros((4, 100, 8)), ["a", "b"])
+    assert [mode.ensembles for mode in modes] == [(0, 3), (1,), (2,)]
+    assert list(modes[0].values) == ["b", "a"]
+
+
+def test_ensembles_that_overlap_by_way_of_others_are_one_place():
+    rng = np.random.default_rng(1)
+    samples = rng.normal(size=(4, 100, 8, 1)) + 4.0 * np.arange(4)[:, None, None, None]
+    assert modes_of(samples, np.zeros((4, 100, 8)), ["a"]) == ()
+
+
+def test_ensembles_on_their_way_are_in_no_place():
+    """Far apart, but drifting; then at the same distance, but each walker still where it was; then too few steps."""
+    rng = np.random.default_rng(1)
+    apart = 50.0 * np.arange(4)[:, None, None, None]
+    drift = np.linspace(0.0, 3.0, 100)[:, None, None]
+    still = rng.normal(size=(4, 1, 8, 1)) + 0.01 * rng.normal(size=(4, 100, 8, 1))
+    walking = rng.normal(size=(4, 100, 8, 1))
+
+    def are_told(samples):
+        return bool(modes_of(samples + apart, np.zeros(samples.shape[:3]), ["a"]))
+
+    assert are_told(walking)
+    for samples in (walking + drift, still, np.repeat(still[:, :1], 100, axis=1), walking[:, :7]):
+        assert not are_told(samples)
+
+
+def banana(x):
+    across = (x[:, 1] - x[:, 0] ** 2) / 0.05
+    return -0.5 * ((x[:, 0] / 3.0) ** 2 + across**2 + (x[:, 2:] ** 2).sum(axis=1))
+
+
+def uneven(x):
+    return -0.5 * ((x * np.logspace(0.0, 3.0, x.shape[1])) ** 2).sum(axis=1)
+
+
+def funnel(x):
+    others = x.shape[1] - 1
+    return -0.5 * ((x[:, 0] / 3.0) ** 2 + (x[:, 1:] ** 2).sum(axis=1) * np.exp(-x[:, 0]) + others * x[:, 0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("log_probability", "steps"),  # a funnel is walked through in 250
+    [(banana, 60), (banana, 250), (uneven, 60), (uneven, 250), (funnel, 60), (funnel, 150)],
+)
+def test_a_slow_run_is_not_taken_for_several_modes(log_probability, steps):
+    """One mode each, hard to walk through, and ensembles that start as small clusters far from one another."""
+    centres = 3.0 * np.random.default_rng(2).normal(size=(4, 1, 6))
+    draws = run(log_probability, centres, scale=1e-3, steps=steps, parameters=6)
+    assert not draws.converged
+    assert np.all(draws.r_hat > 1.05)
+    assert draws.modes == ()
+
+
+def walked(steps):
+    """Coordinates of walkers before the first and after each of these steps, some of which do not move them."""
+    rng = np.random.default_rng(1)
+    moves = rng.normal(size=(2, steps + 1, 4, 3)) * (rng.random((2, steps + 1, 4, 1)) < 0.5)
+    return np.cumsum(moves, axis=1)
+
+
+def as_block(samples):
+    return Block(samples, samples.sum(axis=-1), ())
+
+
+def second_half(state):
+    """Samples and log-probability at a diagnosis, whether walkers moved, and the thinning."""
+    state = state.halved()
+    return state.half.samples, state.half.values, state.half.moved[:, 1:], state.every
+
+
+def appended(samples, ends, coordinates):
+    state = RunState.begin(coordinates, as_block(samples[:, :1]))
+    for begin, end in zip([0, *ends], ends, strict=False):
+        state = state.append(as_block(samples[:, begin + 1 : end + 1]))
+    return state
+
+
+@pytest.fixture
+def little_memory(monkeypatch):
+    """No more than ten steps are kept."""
+    monkeypatch.setattr(run_state, "_MAX_STORED", 10 * 24)
+
+
+@pytest.mark.parametrize(("steps", "every"), [(1, 1), (2, 1), (7, 1), (20, 1), (21, 2), (22, 2), (43, 4), (100, 8)])
+@pytest.mark.usefixtures("little_memory")
+def test_the_second_half_is_kept_and_of_many_steps_every_so_manieth(steps, every):
+    """And whether walkers moved is known of all of them."""
+    samples = walked(steps)
+    points, values, moved, thinning = second_half(appended(samples, [steps], Coordinates()))
+    assert thinning == every
+    assert points.shape[1] <= 11
+    number = np.arange(steps + 1)
+    np.testing.assert_array_equal(points, samples[:, (number > steps // 2) & (number % every == 0)])
+    np.testing.assert_array_equal(values, points.sum(axis=-1))
+    np.testing.assert_array_equal(moved, np.any(np.diff(samples[:, steps // 2 + 1 :], axis=1) != 0.0, axis=-1))
+
+
+@pytest.mark.usefixtures("little_memory")
+def test_blocks_and_looks_make_no_difference():
+    steps, positive = 90, Logarithms(np.array([True, False, True]))
+    samples = 0.01 * walked(steps)
+    whole = appended(samples, [steps], positive)
+    parts = appended(samples, [3, 10, 11, 40], positive).halved()
+    for begin, end in ((40, 47), (47, 80), (80, 90)):
+        parts = parts.append(as_block(samples[:, begin + 1 : end + 1]))
+    resumed = RunState(positive, as_block(samples[:, :41]), 40, appended(samples, [40], positive).halved().parts)
+    resumed = resumed.append(as_block(samples[:, 41:]))
+    for other in (parts, resumed):
+        for one, another in zip(second_half(whole), second_half(other), strict=True):
+            np.testing.assert_array_equal(one, another)
+        assert second_half(other)[-1] > 1
+
+
+@pytest.mark.parametrize(("count", "stay"), [(4, 0), (5, 5)])
+def test_few_lost_walkers_are_taken_back_and_many_stay(count, stay):
+    """An ensemble has 48 walkers, of which a tenth counts as few; the others are where they were."""
+    rng = np.random.default_rng(1)
+    samples = rng.normal(size=(2, 20, 48, 1))
+    samples[0, :, :count] += 1000.0
+    values = np.where(samples[..., 0] > 500.0, -50.0, -0.5 * samples[..., 0] ** 2)
+    start = Block(samples[:, :1], values[:, :1], ())
+    state = RunState.begin(Coordinates(), start).append(Block(samples, values, ())).halved()
+    last = state.recovered().last
+    assert np.count_nonzero(last.samples[:, -1] > 500.0) == stay
+    np.testing.assert_array_equal(last.samples[:, -1, count:], samples[:, -1, count:])
+    np.testing.assert_array_equal(last.samples[:, :-1], samples[:, :-1])
+    if not stay:
+        np.testing.assert_array_equal(last.log_probability[0, -1], -0.5 * last.samples[0, -1, :, 0] ** 2)

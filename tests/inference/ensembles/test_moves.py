@@ -60,11 +60,9 @@ class Gaussian:
 
 
 def moments(target: Gaussian, moves, *, ensembles: int, steps: int, watched: int = 0):
-    """Mean less the true mean, and mean square about it less 1, in true sd; their standard errors: (2, parameters).
-
-    The walkers start from the target itself, exactly, and a move that leaves it invariant keeps them there: every step
-    counts, none is burnt. The error is that between ensembles, which are independent.
-    """
+    """Mean less the true mean, and mean square about it less 1, in true sd; their standard errors: (2, parameters). The
+    walkers start from the target itself, exactly, and a move that leaves it invariant keeps them there: every step
+    counts, none is burnt. The error is that between ensembles, which are independent."""
     totals, moved = [], 0.0
     for own in np.random.SeedSequence(1).spawn(ensembles):
         first, second = own.spawn(2)

@@ -10,21 +10,28 @@ from scipy import stats
 
 from helpers.contour_posteriors import BRIEF, CELL, MODEST, TRUTH, infer_as_stated, only, swept
 from helpers.refusals import refused
-from tactile_bayes.calibration.calibrate import calibrate, experiment_of
+from tactile_bayes import (
+    Family,
+    LoadCell,
+    Rig,
+    Rotation,
+    Translation,
+    calibrate,
+    check,
+    contour_band,
+    infer_contour,
+    scan,
+)
+from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.diagnostics.predictive_check import predictive_check
-from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
-from tactile_bayes.load_cell import LoadCell, RandomWalk
+from tactile_bayes.load_cell import RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.parameters import GROUPS
-from tactile_bayes.sweep import Rotation, Translation, scan
-from tactile_bayes.uncertainty.band import contour_band
 
 SMOOTH = ("discrepancy",)
 CONTOUR = Parabola(TRUTH["a"], TRUTH["q"], TRUTH["x_c"])

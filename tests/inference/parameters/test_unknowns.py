@@ -10,21 +10,16 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL, DEVIATIONS, TRUTH, only
 from helpers.refusals import refused
+from tactile_bayes import LoadCell, Rig, Rod, SamplerSettings, Translation, infer_contour, make_record, scan
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.record.attributes import same_rod
-from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.stated import rod_with
-from tactile_bayes.sweep import Translation, scan
 
 SI = Rod(length=0.1, flexural_rigidity=2e-4, diameter=0.002)
 
@@ -56,10 +51,8 @@ def priors_of(measured, *names, cell=None):
     ids=["none", "EI", "seven", "moment only", "moment only, EI"],
 )
 def test_what_unknowns_cost_is_what_was_found_independently(unknowns, channels, expected):
-    """Standard deviations of a, q and x_c, of profile II in a double sweep at 2°, by Fisher information.
-
-    Within a quarter, since they were quoted to a digit, with a step at events and priors that are not told.
-    """
+    """Standard deviations of a, q and x_c, of profile II in a double sweep at 2°, by Fisher information. Within a
+    quarter, since they were quoted to a digit, with a step at events and priors that are not told."""
     measured = scan(paper_profile("II", q=0.5), drive_step=np.radians(2.0)).record
     measured = measured.assign({c: np.nan * measured[c] for c in CHANNELS if c not in channels})
     model = model_of(measured, unknowns)

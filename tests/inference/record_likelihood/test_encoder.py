@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from helpers.contour_posteriors import CELL, TRUTH, infer_as_stated, swept
+from tactile_bayes import LoadCell, SamplerSettings
 from tactile_bayes.contours import Parabola
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.record_likelihood.encoder import EncoderErrors
-from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.record_likelihood.likelihood import EncoderErrors, RecordLikelihood
 from tactile_bayes.record import in_frame
 
 ROUGH = replace(CELL, drive_angle_noise=0.01)

@@ -10,18 +10,15 @@ import xarray as xr
 from scipy import stats
 
 from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
+from tactile_bayes import LoadCell, Motion, Rig, Rod, Translation, scan
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Contour, Parabola, PowerLaw
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood, events_of
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, in_frame, loads_of, rod_of
 from tactile_bayes.record.units import with_rod
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import Motion, Translation, scan
 
 SHARE = {False: 3e-4, True: 1e-6}  # error of the interpolated loads over their largest value, at worst, in 150 contours
 WIRE = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
@@ -29,10 +26,8 @@ WIRE_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
 
 
 def exact_loads(record, contour, friction=0.0):
-    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`.
-
-    NaN where friction would hold a rod that is curved toward the object at first, which `scan` leaves out.
-    """
+    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`. NaN where
+    friction would hold a rod that is curved toward the object at first, which `scan` leaves out."""
     out = np.full((record.sizes["sample"], 3), np.nan)
     for sweep in np.unique(record.sweep.values):
         rows = np.flatnonzero(record.sweep.values == sweep)

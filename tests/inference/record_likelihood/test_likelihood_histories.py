@@ -8,11 +8,11 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL
+from tactile_bayes import Rig
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.record import CHANNELS, loads_of
-from tactile_bayes.rig import Rig
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 SHIFTS = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6)]
@@ -44,12 +44,17 @@ def test_the_fast_mode_agrees_with_the_exact_one(drive):
 ONE = tb.contours.Circle(np.array([0.3]), np.array([0.8]))
 
 
+def assert_predicted(true, contour, rig=None, *, read=None, cell=CELL, friction=0.0, exact=True, rubs=False):
+    """Of a record, as it was read, the true loads are predicted."""
+    likelihood = RecordLikelihood(true if read is None else read, cell, friction, exact, rubs=rubs)
+    loads, reached = likelihood.predict(contour, rig)
+    assert reached.all()
+    np.testing.assert_allclose(loads[0], loads_of(true), atol=1e-7 if exact else 1e-4)
+
+
 @pytest.mark.parametrize("drive", [SHIFTS, TURNS, CURVED])
 def test_predicted_loads_are_those_of_a_scan(drive):
-    record = tb.scan(CIRCLE, drive=drive).record
-    loads, reached = RecordLikelihood(record, CELL, exact=True).predict(ONE)
-    assert reached.all()
-    np.testing.assert_allclose(loads[0], loads_of(record), atol=1e-7)
+    assert_predicted(tb.scan(CIRCLE, drive=drive).record, ONE)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
@@ -61,11 +66,7 @@ def test_a_drive_that_begins_in_contact_was_turned_in(friction, exact):
     record = tb.scan(CIRCLE, tb.Rig(unknown={"friction": friction}), drive=drive).record
     moved = record.isel(sample=record.base_x.values < 0.2)
     assert moved.holding_moment.values[0] > 0.1
-    likelihood = RecordLikelihood(moved, CELL, friction, exact=exact)
-    loads, reached = likelihood.predict(ONE, RigValues(friction=friction))
-    assert reached.all()
-    known = loads_of(moved)
-    np.testing.assert_allclose(loads[0], known, atol=1e-7 if exact else 1e-4)
+    assert_predicted(moved, ONE, RigValues(friction=friction), friction=friction, exact=exact)
 
 
 @pytest.mark.parametrize("angle", [1.7, 1.3714, 1.36])
@@ -92,8 +93,7 @@ def test_an_encoder_offset_is_that_of_the_clamp():
     read, true = (
         tb.scan(CIRCLE, drive=tb.Translation((0.8, 0.0), np.pi, angle, 1.6)).record for angle in (1.1, 1.1 - offset)
     )
-    loads, _ = RecordLikelihood(read, CELL, exact=True).predict(ONE, RigValues(drive_angle_offset=offset))
-    np.testing.assert_allclose(loads[0], loads_of(true), atol=1e-7)
+    assert_predicted(true, ONE, RigValues(drive_angle_offset=offset), read=read)
 
 
 def test_what_a_drive_does_not_tell_is_left_out():
@@ -141,9 +141,7 @@ def test_the_likelihood_is_that_of_the_noise_about_the_scan(drive, numbered, exa
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_friction_of_the_rig_has_the_same_history(exact):
     record = in_parts(turned_back(DRIVES["once"]))
-    loads, usable = RecordLikelihood(record, QUIET, exact=exact, rubs=True).predict(STACK, RigValues(friction=0.3))
-    assert usable.all()
-    np.testing.assert_allclose(loads[0], loads_of(record), atol=1e-7 if exact else 1e-4)
+    assert_predicted(record, STACK, RigValues(friction=0.3), cell=QUIET, exact=exact, rubs=True)
 
 
 def test_without_friction_or_if_it_goes_one_way_a_drive_has_no_history():
@@ -171,6 +169,4 @@ def test_errors_of_the_encoder_move_samples_along_their_way():
 def test_an_offset_of_the_encoder_is_that_of_the_whole_way():
     record = in_parts(turned_back(DRIVES["once"]))
     read = record.assign(drive_angle=record.drive_angle + 0.02)
-    rig = RigValues(friction=0.3, drive_angle_offset=0.02)
-    loads, _ = RecordLikelihood(read, QUIET, exact=True, rubs=True).predict(STACK, rig)
-    np.testing.assert_allclose(loads[0], loads_of(record), atol=1e-7)
+    assert_predicted(record, STACK, RigValues(friction=0.3, drive_angle_offset=0.02), read=read, rubs=True)

@@ -11,21 +11,15 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, only, swept, without
 from helpers.refusals import refused
-from tactile_bayes.comparison.families import compare_families
+from tactile_bayes import LoadCell, Rig, Stream, calibrate_rig, contour_band, infer_contour
 from tactile_bayes.contours import Circle, Parabola, from_function
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.contour import calibrate_rig, infer_contour
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, experiment_of
 from tactile_bayes.inference.family import Gauge
-from tactile_bayes.inference.parameters.rig_prior import rig_prior
-from tactile_bayes.inference.stored_experiment import experiment_of
-from tactile_bayes.inference.streams.stream import Stream
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rig import Rig
+from tactile_bayes.inference.parameters.priors import rig_prior
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import expanded
-from tactile_bayes.uncertainty.band import contour_band
 
 PIN, OBJECT = Circle(r=0.2, q=0.5), Parabola(0.7, 0.45)
 UNKNOWN = only("rigidity_scale", "drive_angle_offset", "lever")
@@ -119,11 +113,8 @@ def test_the_rig_is_found_with_its_gauge_and_what_lasts_of_it_is_calibrated():
 
 @pytest.mark.slow
 def test_two_records_tell_as_much_as_one_of_both():
-    """Of one pin, touched from two pivots.
-
-    A mean of 400 effective draws scatters by 0.05 deviations, a deviation by 4 %: limits are six times those of two
-    posteriors, which leaves room for the error of the density.
-    """
+    """Of one pin, touched from two pivots. A mean of 400 effective draws scatters by 0.05 deviations, a deviation by 4
+    %: limits are six times those of two posteriors, which leaves room for the error of the density."""
     for name in NAMES:
         both, one, first = (r.calibration.posterior["posterior"][name] for r in (rig_of_two(), rig_from(0, 1), rig()))
         assert abs(float(both.mean() - one.mean())) < 0.42 * float(one.std())
@@ -213,19 +204,6 @@ def test_a_stored_posterior_has_the_same_prior():
     points = np.array([[0.7, 0.45, 0.0, *TRUE.values(), 1.0]])
     given = Experiment(read(OBJECT, 2), rig()).model
     np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_families_are_compared_with_the_rig():
-    """One parameter has no correlations: its prior given by hand has the same evidence, up to the error of bridges."""
-    record, alone = read(OBJECT, 2), rig_prior(drawn(("rigidity_scale",)))
-    known = {"families": ["parabola", "circle"], "leave_one_out": False, "rng": 1}
-    stated = Rig(load_cell=CELL, unknown=only(**alone.priors))
-    with_rig = compare_families(record, rig=calibrated(alone), settings=SOUND, **known)
-    by_hand = compare_families(record, rig=stated, settings=SOUND, **known)
-    assert with_rig.attrs["most_probable"] == "parabola"
-    evidences = (one["log_evidence"].sel(family="parabola") for one in (with_rig, by_hand))
-    assert abs(float(next(evidences) - next(evidences))) < 0.2
 
 
 def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept():

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import CELL
-from tactile_bayes import SamplerSettings, Translation, infer_contacts, infer_contour, scan
+from tactile_bayes import Rig, SamplerSettings, Translation, infer_contacts, infer_contour, scan
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood import shortening
@@ -21,7 +21,7 @@ from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 
 CONTOUR = paper_profile("II", q=0.5)
 BRIEF = SamplerSettings(ensembles=2, walkers=48, block_steps=5, max_steps=5)
@@ -209,9 +209,7 @@ def test_contacts_of_a_long_record_are_of_every_so_many_samples(monkeypatch):
 @pytest.mark.slow
 def test_a_limit_of_time_holds_for_200_000_samples():
     """Ten seconds above the limit, and 1 GB, in a process of its own whose first, short run waits for compiled code.
-
-    Seconds of the processor, for on a machine that others use, too, the clock says little of what follows the limit.
-    """
+    Seconds of the processor, for on a machine that others use, too, the clock says little of what follows the limit."""
     root = Path(__file__).parents[3]
     command = [sys.executable, "-m", "benchmarks.long_records", "200000"]
     done = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True)

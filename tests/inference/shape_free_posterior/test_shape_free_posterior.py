@@ -6,23 +6,17 @@ from scipy import stats
 from scipy.special import gamma, kv
 
 from helpers.contour_posteriors import CELL, only, swept, without
+from tactile_bayes import Family, LoadCell, Rig, Rod, SamplerSettings, contour_band, infer_contour, scan
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.diagnostics.predictive_check import predictive_check
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.shape_free_posterior.columns import linear_names
-from tactile_bayes.inference.shape_free_posterior.observations import Observer
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import Anchor
+from tactile_bayes.inference.shape_free_posterior.observations import Observer, linear_names
 from tactile_bayes.inference.shape_free_posterior.whitening import _linear_prior, whitening_at
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.rig_prior import RigPrior
-from tactile_bayes.sweep import scan
-from tactile_bayes.uncertainty.band import contour_band
 
 SI = Rod(length=0.1, flexural_rigidity=2e-4)
 SI_CELL = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
@@ -152,11 +146,9 @@ def test_a_start_out_of_reach_leads_somewhere():
 
 @pytest.mark.parametrize(("noise", "spread"), [(1.0, 1.0), pytest.param(1e-3, 3.0, marks=pytest.mark.slow)])
 def test_in_its_coordinates_the_posterior_is_nearly_standard_normal(noise, spread):
-    """At one noise, amplitude and length scale: what is left of the log-probability varies by less than 1.
-
-    With loads 100,000 times their noise, even three times as far out: slopes that rounding errors leave would narrow
-    directions of which the record says nothing.
-    """
+    """At one noise, amplitude and length scale: what is left of the log-probability varies by less than 1. With loads
+    100,000 times their noise, even three times as far out: slopes that rounding errors leave would narrow directions of
+    which the record says nothing."""
     model = model_of(cell=LoadCell(force_noise=noise * CELL.force_noise, moment_noise=noise * CELL.moment_noise))
     whitening = whitened(model)
     normal = spread * np.random.default_rng(3).normal(size=(200, whitening.middle.size - whitening.bent))
@@ -181,11 +173,8 @@ def assert_in_band(result, truth, width, scale=1.0):
     [("I", ALL, 50_000), ("II", ALL, 50_000), ("II", "nothing", 40_000), ("III", ALL, 50_000)],
 )
 def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
-    """Converged in some 100 steps.
-
-    With the unknowns there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
-    each of four ensembles, it makes 344 evaluations in place of 272.
-    """
+    """Converged in some 100 steps. With the unknowns there are 43 parameters in place of 34, and as a step moves two
+    walkers for each parameter in each of four ensembles, it makes 344 evaluations in place of 272."""
     truth = paper_profile(profile, q=0.5)
     measured = CELL.measure(scan(truth, drive_step=np.radians(1.0)).record, rng=1)
     result = infer_contour(measured, family="shape-free", rig=Rig(load_cell=CELL, unknown=unknown), rng=1)
@@ -280,3 +269,51 @@ def test_a_zero_that_is_not_known_hides_no_snap_off(bias):
     assert found.ends.all()
     loaded = (record.holding_moment != 0.0).values
     assert np.count_nonzero(found.loaded != loaded) <= 6  # just after first contact the noise hides the load
+
+
+_NODES = 32
+
+
+def _log_radii(count, seed=1):
+    """Return logarithms of radii that change by some tens of per cent along a contour, shape (count, nodes)."""
+    alpha = Smooth.nodes(_NODES)
+    waves = np.stack([np.cos(k * alpha + k) for k in range(4)])
+    return -0.5 + np.random.default_rng(seed).normal(scale=0.3, size=(count, 4)) @ waves
+
+
+def _place(log_radius, slope_angle):
+    """Return heights and distances from the vertex at a slope angle, shape (n, 2)."""
+    at = Smooth(log_radius, q=np.zeros(len(log_radius))).locate(np.full((1,), slope_angle))
+    return np.column_stack([at.y, at.x])
+
+
+@pytest.mark.parametrize("slope_angle", [-1.2, -0.3, 0.8])
+def test_what_is_beyond_a_line_is_the_rest_of_the_contours_place(slope_angle):
+    """The line is through differences of the contour's place."""
+    centre, others = _log_radii(1)[0], _log_radii(5, seed=2)
+    steps = 1e-5 * np.eye(_NODES)
+    slopes = (_place(centre + steps, slope_angle) - _place(centre - steps, slope_angle)) / 2e-5
+    linear = _place(centre[None], slope_angle) + (others - centre) @ slopes
+    beyond = Anchor(slope_angle, centre).beyond_line(others)
+    assert np.all(np.abs(beyond) > 1e-4)
+    np.testing.assert_allclose(beyond, _place(others, slope_angle) - linear, rtol=1e-4, atol=1e-7)
+
+
+def test_at_the_centre_and_for_small_changes_there_is_nothing_beyond():
+    centre = _log_radii(1)[0]
+    anchor = Anchor(0.7, centre)
+    np.testing.assert_array_equal(anchor.beyond_line(centre[None]), 0.0)
+    assert np.abs(anchor.beyond_line(centre + 1e-4 * np.eye(_NODES))).max() < 1e-8
+
+
+def test_the_best_anchor_is_where_the_deviations_leave_the_contour():
+    """The only deviation changes a radius everywhere, and the vertex so that one place stays."""
+    centre = np.full(_NODES, np.log(0.5))
+    wider = np.full((1, _NODES), 0.2)
+    stays = 0.6
+    vertex = -0.2 * 0.5 * np.array([[1.0 - np.cos(stays), np.sin(stays)]])
+    assert Anchor.best(centre, wider, vertex).slope_angle == pytest.approx(stays, abs=0.026)
+
+
+def test_huge_radii_leave_finite_numbers():
+    assert np.isfinite(Anchor(1.4, _log_radii(1)[0]).beyond_line(np.full((1, _NODES), 700.0))).all()

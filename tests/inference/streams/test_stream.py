@@ -11,15 +11,14 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers.contour_posteriors import CELL
 from helpers.refusals import refused
+from tactile_bayes import Rig
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_evidence import contour_evidence
-from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.evidence import contour_evidence
+from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.streams import particles
 from tactile_bayes.inference.streams.stream_state import read_tree, surprise_after
 from tactile_bayes.record.netcdf import write_netcdf
-from tactile_bayes.rig import Rig
 
 STATED = Rig(load_cell=CELL, unknown="nothing")
 PROFILE = tb.contours.paper_profile("II", q=0.5)
@@ -207,13 +206,13 @@ def test_a_stream_that_goes_on_has_the_numbers_of_one_that_was_not_stopped(measu
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"rng": 2}, "seed (was '1, pool of 4', now '2, pool of 4')"),
-        ({"family": "circle"}, "family (was 'parabola', now 'circle')"),
-        ({"particles": 200}, "particles (was '100', now '200')"),
+        ({"rng": 2}, "seed is 1, pool of 4 there and 2, pool of 4 here"),
+        ({"family": "circle"}, "family is parabola there and circle here"),
+        ({"particles": 200}, "particles is 100 there and 200 here"),
         ({"rig": STATED.with_unknown(friction="default")}, "nuisances"),
         ({"rig": replace(STATED, load_cell=replace(CELL, force_noise=0.06))}, "load_cell_force_noise"),
         ({"family": tb.Family("parabola", q=stats.norm(0.5, 0.1))}, "priors"),
-        ({"record": "shorter"}, "samples (was '30', now '20')"),
+        ({"record": "shorter"}, "samples is 30 there and 20 here"),
         ({"record": "another"}, "record (its SHA-256)"),
     ],
 )

@@ -16,8 +16,8 @@ from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, 
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.parameters.priors import default_priors
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler
 from tactile_bayes.mechanics.branches import sweeps

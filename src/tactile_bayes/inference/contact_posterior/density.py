@@ -32,12 +32,8 @@ ContactPrior = Literal["flat", "polar"] | LogPrior
 
 @dataclass(frozen=True, eq=False)
 class ContactDensity:
-    """Log-density of contacts, given one sample each.
-
-    The prior is a density over contact point and slope angle; on a phase's sheet of (force, ψ1, s1, drive angle) it is
-    multiplied by the volume that the sheet's coordinates span. A sample touches with the angle of friction times its
-    `sense`, which lies between −1 and 1 if it sticks.
-    """
+    """Log-density of contacts, given one sample each, in coordinates of the sheet of a phase. A sample touches with the
+    angle of friction times its `sense`, which lies between −1 and 1 if it sticks."""
 
     samples: Samples
     readings: LoneSamples
@@ -76,10 +72,7 @@ class ContactDensity:
         return replace(self, samples=samples, readings=readings, base=self.base[where])
 
     def log_density(self, coordinates: Floats, phase: NDArray[np.int8]) -> Floats:
-        """Return the log-density over force, ψ1 (tip) or arc length (tangential), and drive angle; −inf if impossible.
-
-        Shapes: coordinates (..., n, 4), phase and result (..., n).
-        """
+        """Return the log-density, (..., n), over force, ψ1 (tip) or arc length, and drive angle; −inf if impossible."""
         shape = coordinates.shape[:-1]
         tip = phase.reshape(-1) == TIP
         rod = self._states(coordinates)
@@ -139,10 +132,7 @@ class ContactDensity:
         return values
 
     def unfold(self, points: Floats) -> tuple[Floats, NDArray[np.int8]]:
-        """Return coordinates and phase from points (way, force[, drive angle]), shape (..., n, 2 or 3).
-
-        The way is ψ1 + δ ≥ 0 in tip contact, and s1 − 1 < 0 in tangential contact.
-        """
+        """Return coordinates and phase of points (way, force[, drive angle]); the way is ψ1 + δ or s1 − 1 < 0."""
         way = points[..., 0]
         z = np.empty((*points.shape[:-1], 4))
         z[..., FORCE] = points[..., 1]

@@ -15,7 +15,7 @@ from tactile_bayes.checks import check_function, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
 from tactile_bayes.inference.contact_posterior.draws import CHAINS, LEAST_DRAWS, MixedDraws, draw_contacts, mixed
-from tactile_bayes.inference.importance import LARGEST_K
+from tactile_bayes.inference.densities import LARGEST_K
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.inference.result import library
@@ -177,10 +177,8 @@ def infer_contacts(
 def density_of(
     measured: xr.Dataset, cell: LoadCell, friction: float, prior: ContactPrior
 ) -> tuple[ContactDensity, Index, Floats]:
-    """Return the density of the loaded samples, with their numbers and prior probabilities' logarithms.
-
-    Where a sample may also stick, or slide the other way, it stands there once for each direction of the force.
-    """
+    """Return the density of the loaded samples, with their numbers and the logarithms of their prior probabilities.
+    Where a sample may also stick, or slide the other way, it stands there once for each direction of the force."""
     samples = with_likelier_senses(samples_of(measured, cell), measured, cell, friction)
     if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
         about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))

@@ -9,7 +9,6 @@ import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +16,15 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, StoredSteps
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, whole_seed
-from tactile_bayes.tasks import alone_in, check_format, is_temporary, versions_of, write_atomically
+from tactile_bayes.tasks import alone_in, check_format, differences, is_temporary, versions_of, write_atomically
 from tactile_bayes.tasks.documents import read_json
 
 _START = "starting points"  # they follow from the other entries
-_MAX_CHARACTERS = 60  # largest number of characters of an entry in an error message
+_MOST_NAMED = 20  # largest number of differing entries that a message names
 
 
 def identity_of_run(
@@ -43,28 +42,6 @@ def identity_of_run(
         _START: hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
         **versions_of("emcee"),
     }
-
-
-def changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """Return the entries that differ, each as text with its old and new value."""
-    found = []
-    differing = [name for name in {**now, **before} if before.get(name) != now.get(name)]
-    for name in [name for name in differing if name != _START] or differing:
-        was, has_become = before.get(name), now.get(name)
-        first = len([*takewhile(lambda both: both[0] == both[1], zip(was or "", has_become or "", strict=False))])
-        found.append(f"{name} (was {_shown(was, first)}, now {_shown(has_become, first)})")
-    return found
-
-
-def _shown(text: str | None, at: int) -> str:
-    """Return an entry, shortened to the surroundings of a position."""
-    if text is None:
-        return "not stated"
-    if len(text) <= _MAX_CHARACTERS:
-        return repr(text)
-    begin = max(0, min(at - _MAX_CHARACTERS // 3, len(text) - _MAX_CHARACTERS))
-    end = begin + _MAX_CHARACTERS
-    return ("…" if begin else "") + repr(text[begin:end]) + ("…" if end < len(text) else "")
 
 
 _FILE, _KIND, _FORMAT = "checkpoint.npz", "ensembles of tactile-bayes", 2
@@ -136,10 +113,12 @@ class Checkpoint:
             raise ValueError(f"it is of kind {table['kind']!r}")
         other = "or give another folder"
         check_format(table["format"], _FORMAT, lambda what: InferenceError(f"{self._path} {what}: {other}"), _FORMAT)
-        if found := changes({name: str(value) for name, value in table["identity"].items()}, self._identity):
+        there = {name: str(value) for name, value in table["identity"].items()}
+        before, now = ({n: v for n, v in each.items() if n != _START} for each in (there, self._identity))
+        if found := differences(before, now, most=_MOST_NAMED) or differences(there, self._identity):
             raise InferenceError(
-                f"{self._path.parent} is the checkpoint of another run, which differs in {'; '.join(found)}: give "
-                "another folder, or what was given then (only max_steps, max_seconds, min_ess and max_r_hat may change)"
+                f"{self._path.parent} is the checkpoint of another run: {found}; give another folder, or what was "
+                "given then (only max_steps, max_seconds, min_ess and max_r_hat may change)"
             )
         self._steps, self.seconds, self.is_end = int(table["steps"]), float(table["seconds"]), bool(table["is_end"])
         self._random_states = table["random_states"]

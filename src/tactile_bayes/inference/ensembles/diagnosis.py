@@ -17,10 +17,7 @@ _LOST_BELOW = 10.0  # distance of a lost walker's largest log-probability below 
 
 
 def lost_walkers(values: Floats) -> Flags:
-    """Return True for walkers far less probable than the rest, (chain, walker), from their log-probabilities.
-
-    R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails.
-    """
+    """Return True for walkers, (chain, walker), far less probable than the rest, which R̂ would not detect."""
     if not values.shape[1]:
         return np.zeros((len(values), values.shape[2]), dtype=bool)
     return np.asarray(values.max(axis=1) < np.median(values) - _LOST_BELOW)
@@ -40,18 +37,9 @@ class Diagnosis:
         laid_out = walker_major(samples)
         self.ess_bulk = _each(array_stats.ess, laid_out, method="bulk")
         self.ess_tail = _each(array_stats.ess, laid_out, method="tail", prob=_TAIL)
-
-    @property
-    def worst_r_hat(self) -> int:
-        return int(np.argmax(np.where(np.isnan(self.r_hat), np.inf, self.r_hat)))
-
-    @property
-    def worst_ess(self) -> int:
-        return int(np.argmin(np.nan_to_num(self.ess)))
-
-    @property
-    def ess(self) -> Floats:
-        return np.minimum(self.ess_bulk, self.ess_tail)
+        self.ess = np.minimum(self.ess_bulk, self.ess_tail)
+        self.worst_r_hat = int(np.argmax(np.where(np.isnan(self.r_hat), np.inf, self.r_hat)))  # number of a parameter
+        self.worst_ess = int(np.argmin(np.nan_to_num(self.ess)))
 
     def satisfies(self, max_r_hat: float, min_ess: float) -> bool:
         return bool(np.all(self.r_hat < max_r_hat) and np.all(self.ess >= min_ess))
@@ -109,10 +97,8 @@ class Mode:
 
 
 def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Mode, ...]:
-    """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities.
-
-    Only if each ensemble is stationary, disagreement means several modes rather than a slow run; else there are none.
-    """
+    """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities. Only if
+    each ensemble is stationary, disagreement means several modes rather than a slow run; else there are none."""
     if not _are_stationary(samples):
         return ()
     mean, deviation = samples.mean(axis=(1, 2)), samples.std(axis=(1, 2))  # (chain, parameter)

@@ -9,7 +9,7 @@ import emcee
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 
 Moves = Sequence[tuple[Any, float]]  # moves of an ensemble, with their shares. They keep nothing from step to step.
@@ -22,10 +22,7 @@ def step_ensembles(
     target: LogProbability, moves: Moves, randoms: Sequence[np.random.RandomState], points: Floats, values: Floats
 ) -> tuple[Floats, Floats]:
     """Return points, (chain, walker, parameter), and their log-density, (chain, walker), after a step of all ensembles.
-
-    Each moves by halves with its own random numbers, as if it were alone (Foreman-Mackey et al. 2013, doi
-    10.1086/670067), while the target is evaluated for all at once.
-    """
+    Each moves by halves with its own random numbers, as if alone, while the target is evaluated for all at once."""
     points, values = points.copy(), values.copy()
     shares = np.array([share for _, share in moves])
     chosen, halves = [], []
@@ -51,10 +48,7 @@ def step_ensembles(
 
 class FittedMove(emcee.moves.RedBlueMove):
     """Proposals from a distribution, Student's t by default, fitted to the half of the ensemble that does not move.
-
-    They do not depend on the moving half, so that the target stays invariant however bad the fit is. Boehl (2022), doi
-    10.2139/ssrn.4250395, adapts such proposals to the whole run instead.
-    """
+    They leave the target invariant however bad the fit is (compare Boehl 2022, doi 10.2139/ssrn.4250395)."""
 
     def __init__(
         self, columns: slice = slice(None), fit: Callable[[Floats], Proposal | Mixture] = Proposal.fitted
@@ -79,11 +73,8 @@ class FittedMove(emcee.moves.RedBlueMove):
 
 
 class NormalMove(emcee.moves.RedBlueMove):
-    """Steps that leave a standard normal distribution invariant, for coordinates with nearly that distribution.
-
-    A step combines a random share of the position with a new normal draw (Neal 1999; Cotter, Roberts, Stuart & White
-    2013, doi 10.1214/13-STS421); half of the steps are new draws.
-    """
+    """Steps that leave a standard normal distribution invariant: a random share of the position and a new normal draw.
+    See Cotter, Roberts, Stuart & White 2013, doi 10.1214/13-STS421; half of the steps are new draws."""
 
     def __init__(self, columns: slice) -> None:
         """Move the parameters in `columns` alone."""
@@ -109,10 +100,7 @@ def moves_in(coordinates: Coordinates) -> Moves:
 
 
 def standard_moves(proposal: Mixture | None = None) -> Moves:
-    """Return the moves of an ensemble, with their shares.
-
-    A given proposal is used the more the more efficient it is; short differences reach what it misses.
-    """
+    """Return the moves of an ensemble, with their shares: of a proposal the more, the more efficient it is."""
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
     fixed = _MAX_FIXED_SHARE * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.diagnosis import lost_walkers
 from tactile_bayes.inference.ensembles.moves import Moves, step_ensembles
-from tactile_bayes.inference.ensembles.walkers import RandomState, generator_at, state_of
+from tactile_bayes.inference.ensembles.walkers import RandomState, generator_at
 
 _GROWTH = 1.25  # ratio of the steps at two successive diagnoses: all diagnoses together then cost five times the last
 
@@ -44,7 +44,7 @@ def make_block(target: LogProbability, moves: Moves, last: Block, steps: int, de
         while made < steps and not (made and deadline.has_passed):
             points, values = step_ensembles(target, moves, randoms, points, values)
             samples[:, made], log_probability[:, made] = points, values
-            states = tuple(state_of(random) for random in randoms)
+            states = tuple(tuple(random.get_state()) for random in randoms)
             made += 1
     except KeyboardInterrupt:
         whole = False

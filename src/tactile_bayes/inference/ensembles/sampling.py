@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.coordinates import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, identity_of_run, open_checkpoint
@@ -98,14 +98,13 @@ def sample(
     identity: Mapping[str, str] | None = None,
     coordinates: Coordinates | None = None,
 ) -> Draws:
-    """Draw from a posterior with independent ensembles of walkers, which propose from one another.
+    """Draw from a posterior with independent ensembles of walkers, which propose from one another, until they agree.
 
-    After `block_steps` steps, and whenever their number has grown by a quarter, the second half of them is diagnosed
-    (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every parameter satisfies the settings, the walkers
-    have given five effective draws each on average, and none is lost where nothing is probable. `start`, (ensembles,
-    walkers, parameters), is in the coordinates; it should be wider than the posterior, or R̂ cannot distinguish a part
-    of it from the whole. A KeyboardInterrupt after the first step ends the run with the draws so far. With a checkpoint
-    a run that was killed resumes, bit by bit; `identity` states what determines the log-probability.
+    `start`, (ensembles, walkers, parameters), in the coordinates, should be wider than the posterior, or R̂ cannot
+    distinguish a part of it from the whole. The second half of the steps is diagnosed after `block_steps`, and whenever
+    their number has grown by a quarter (Vehtari et al. 2021, doi 10.1214/20-BA1221): the run stops when settings are
+    satisfied, with five effective draws per walker on average, and no walker lost. A KeyboardInterrupt after the first
+    step ends it. With a checkpoint a run resumes, bit by bit; `identity` states what determines the log-probability.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
@@ -120,7 +119,7 @@ def sample(
         target = CheckedTarget(log_probability, names)
         run = _Run(target, coordinates or Coordinates(), settings, stored, progress, began)
         run.begin(points, seed)
-        while not run.has_ended:
+        while not run.ending or run.diagnosis is None:
             try:
                 run.advance()
                 run.diagnose()
@@ -158,10 +157,6 @@ class _Run:
     @property
     def seconds(self) -> float:
         return time.monotonic() - self.began
-
-    @property
-    def has_ended(self) -> bool:
-        return bool(self.ending) and self.diagnosis is not None
 
     def begin(self, points: Floats, seed: Seed) -> None:
         """Begin at starting points, or at the stored state."""

@@ -19,11 +19,7 @@ RandomState = tuple[Any, ...]  # of NumPy's Mersenne Twister, which emcee's move
 
 
 def first_random_state(seed: np.random.SeedSequence) -> RandomState:
-    return state_of(np.random.RandomState(np.random.MT19937(seed)))
-
-
-def state_of(random: np.random.RandomState) -> RandomState:
-    return tuple(random.get_state(legacy=True))
+    return tuple(np.random.RandomState(np.random.MT19937(seed)).get_state())
 
 
 def generator_at(state: RandomState) -> np.random.RandomState:
@@ -61,11 +57,10 @@ def scatter_walkers(
     *,
     parameters: int,
     seed: Seed,
-    settings: SamplerSettings | None = None,
+    settings: SamplerSettings,
     floor: Callable[[], float] = lambda: -np.inf,
 ) -> Floats:
     """Return random starting points, (ensembles, walkers, parameters), of a log-probability above a floor."""
-    settings = SamplerSettings() if settings is None else settings
     walkers = settings.walkers_for(parameters)
     # The second half, so that the streams differ from those that the same seed gives to the ensembles themselves.
     seeds = spawn(seed, 2 * settings.ensembles)[settings.ensembles :]

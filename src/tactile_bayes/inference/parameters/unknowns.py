@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -13,7 +13,6 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.distributions import Distribution
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
@@ -29,6 +28,26 @@ from tactile_bayes.rig.unknown import of_modes, of_pivots
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
     from tactile_bayes.rig.rig_prior import RigPrior
+
+
+class RigValues(NamedTuple):
+    """Deviations of a rig from the stated one; numbers, or arrays of shape (n,) with one for every contour."""
+
+    drive_angle_offset: Any = 0.0  # encoder offset in addition to that of the load cell's data sheet [rad]
+    rigidity_scale: Any = 1.0  # flexural rigidity over the stated one
+    suspension_compliance: Any = 0.0  # turn of the pivot's suspension per holding moment [rad/(EI/L) as stated]
+    contact_compliance: Any = 0.0  # way of the object per normal force [L/(EI/L²) as stated]
+    friction: Any = 0.0  # Coulomb's coefficient
+    drive_angle_backlash: Any = 0.0  # forward less backward reading, in addition to the data sheet [rad]
+    rest_curvature: Any = 0.0  # rest curvature of the rod in addition to the stated one [1/L]
+    taper: Any = 0.0  # taper of the rod in addition to the stated one
+    stem: Any = 0.0  # rigid piece between pivot and rod in addition to the stated one [L]
+    length: Any = 1.0  # over the stated one; its rest curvature, and what is added to it, are then per that length
+    # Amplitudes of the modes of the rest curvature, shape (n, MOST_MODES); none by default.
+    rest_shape: Any = None
+    # Shifts of pivots, in the order of the record [length], (n, pivots, 2); those after the last are not shifted.
+    base_shifts: Any = None
+
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps its direction
@@ -146,11 +165,8 @@ class Unknowns:
         return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Apply memory, unknown gains, levers and zeros, and the curve, in place, to loads of all samples in a row.
-
-        Shapes: loads (n, ..., samples, 3) [EI/L, EI/L²]. Zeros are given as readings, and enter as the loads that the
-        cell reads as such without its own curve.
-        """
+        """Apply memory, gains, levers, zeros and curve, in place, to loads, (n, ..., samples, 3) [EI/L, EI/L²]. Zeros
+        are given as readings, and enter as the loads that the cell reads as such without its own curve."""
         values = self._with_known(values)
         if self.memory:
             of = by_channel(self.sensor, values)
@@ -206,10 +222,8 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
 
 
 def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Unknowns:
-    """Return the parameters of a rig that are unknown and that the record shows, with their priors.
-
-    A bias that the likelihood integrates out, the noise and the discrepancy are not among them.
-    """
+    """Return the parameters of a rig that are unknown and that the record shows, with their priors. Noise, discrepancy,
+    and a bias that the likelihood integrates out are not among them."""
     present = [_SHORT[name] for name in present_channels(measured)]
     rod, pivots, joint = rod_of(measured), len(bases_of(measured)), rig.calibration
     if joint is not None:

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtr
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.record_likelihood.encoder import EncoderErrors
+from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
-from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
@@ -31,9 +30,48 @@ from tactile_bayes.record import CHANNELS, frame_of, loads_of, rod_of, to_dimens
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.poses.forward_table import Tables
 
-# Error of loads over their noise that is negligible for 360 samples: it changes their log-likelihood by less than 0.05
-# in 999 of 1000 records.
-_UNFELT = 2e-3
+_WIDEST, _NARROWEST = 0.75, 0.1  # distance between neighbouring errors, in standard deviations, at most and at least
+_REACH = 3.75  # largest error that is taken into account, in standard deviations
+_STEEP = np.array([10.0, 30.0, 30.0])  # change of loads close to snap-off [EI/L and EI/L² per rad]
+
+
+class EncoderErrors:
+    """Quadrature nodes (reading less true angle [rad]) and weights over errors of the encoder of a dimensionless cell.
+    A sample's log-probability errs by 0.001, and by 0.8 at worst next to an event, which is resolved to the nodes."""
+
+    def __init__(self, cell: LoadCell) -> None:
+        noise, step = cell.drive_angle_noise, cell.drive_angle_resolution
+        # The sum resolves loads that change by their noise over the distance of nodes.
+        resolved = float(np.min(np.where(cell.noise > 0.0, cell.noise, np.inf) / _STEEP))
+        if noise:
+            distance = noise * float(np.clip(resolved / noise, _NARROWEST, _WIDEST))
+            half = int(np.ceil((_REACH * noise + 0.5 * step) / distance))
+            errors = np.linspace(-half * distance, half * distance, 2 * half + 1)
+            logs = _log_density(errors, noise, step)
+        else:
+            count = int(np.ceil(step / resolved)) + 2 if step else 1
+            errors, logs = step * ((np.arange(count) + 0.5) / count - 0.5), np.zeros(count)
+        self.errors, self.log_weights = errors, logs - logsumexp(logs)
+
+    @property
+    def count(self) -> int:
+        """Number of nodes."""
+        return int(self.errors.size)
+
+    def draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Index:
+        """Draw indices of errors by their weights."""
+        return rng.choice(self.count, size=shape, p=np.exp(self.log_weights))
+
+
+def _log_density(error: Floats, noise: float, step: float) -> Floats:
+    """Return the log-density of the sum of a normal error and a uniform one over a step, up to a constant."""
+    if step == 0.0:
+        return np.asarray(-0.5 * (error / noise) ** 2)
+    far, near = (np.abs(error) + 0.5 * step) / noise, (np.abs(error) - 0.5 * step) / noise
+    return np.asarray(np.log(ndtr(-near) - ndtr(-far)))
+
+
+_UNFELT = 2e-3  # error of loads over their noise that changes the log-likelihood of 360 samples by less than 0.05
 _LEAST = 1e-10  # least tolerance of loads, over the largest load: tables are no more accurate
 # Least tolerance of loads, over the largest load, for which the pose of a rod with a profile comes from a table: its
 # errors are shares of the loads, which are large where a rod touches an object near its pivot.
@@ -42,12 +80,11 @@ _LENGTHS_OF_LINE = [0, 1, 3, 4]  # columns of a line that are lengths, or change
 
 
 class RecordLikelihood:
-    """Likelihood of a record as a function of contour, rig and noise.
+    """Likelihood of a record as a function of contour (in the record's unit of length), rig and noise.
 
-    Contours are in the record's unit of length, loads inside in EI/L and EI/L², forces in the record's frame. With
-    `exact`, paths are so to rounding; otherwise as the noise requires, at a fifth of the cost. Unless
-    `is_always_clear`, contours that the unloaded rod is not clear of after snap-off are excluded. Friction acts if it
-    is stated, or if the rod `rubs` on the object with that of a rig.
+    Loads inside are in EI/L and EI/L², forces in the record's frame. With `exact`, paths are so to rounding; otherwise
+    as the noise requires, at a fifth of the cost. Unless `is_always_clear`, contours that the unloaded rod is not clear
+    of after snap-off are excluded. Friction acts if it is stated, or if the rod `rubs` with that of a rig.
     """
 
     def __init__(
@@ -171,10 +208,7 @@ class RecordLikelihood:
         return self._predict(contours, rig, self.encoder.errors)[:2]
 
     def predict_with_events(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags, Floats]:
-        """Return the results of `predict`, and drive angles read at first contact and snap-off, (n, segments, 2).
-
-        They are in the sweep frame [rad]; NaN if there is no such event.
-        """
+        """Return the results of `predict`, and readings [rad] at first contact and snap-off, (n, segments, 2)."""
         loads, reached, events = self._predict(contours, rig, np.zeros(1))
         return loads[:, 0], reached, events
 
@@ -259,15 +293,6 @@ class RecordLikelihood:
         """Return the log-likelihood of each contour, shape (n,), or of each sample, (n, samples); −inf out of reach."""
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
-    def _within_blocks(self, measured: Floats, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:
-        """Return the log-density of readings within their blocks, for loads of shape (n, samples, 3)."""
-        assert self.blocks is not None
-        assert isinstance(self.load_cell, AveragedCell)
-        of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted))
-        deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
-        present = np.asarray(~np.isnan(measured).all(axis=0))
-        return self.blocks.log_density_within(deviation, present, pointwise=pointwise)
-
     def score(
         self,
         predicted: Floats,
@@ -297,7 +322,11 @@ class RecordLikelihood:
             values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)
             values = values if pointwise else values.sum(axis=-1)
         if self.blocks is not None:
-            values = values + self._within_blocks(measured, predicted[:, 0], scale, pointwise)
+            assert isinstance(self.load_cell, AveragedCell)
+            of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted[:, 0]))
+            deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
+            present = np.asarray(~np.isnan(measured).all(axis=0))
+            values = values + self.blocks.log_density_within(deviation, present, pointwise=pointwise)
         values[~reached] = -np.inf
         if np.any(np.isnan(values)):
             raise ParameterError(

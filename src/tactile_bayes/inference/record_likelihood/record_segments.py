@@ -25,9 +25,9 @@ _FREE = -0.5 * np.pi + 1e-9  # drive angle in the sweep frame from which a rod w
 class RecordSegments:
     """Sweep segments: samples with one pivot, side of contact and direction of the drive, or of one history of it.
 
-    Drive angles are corrected by the data sheet of the load cell. In the frame of a sweep they grow in forward contact.
-    In `angles_in_sweep_frame` the travel takes their place where the drive carries the base [L], and, if the rod `rubs`
-    on the object, where it turns back in contact [rad]: then loads depend on the history of the drive.
+    Drive angles are corrected by the load cell's data sheet; in the frame of a sweep they grow in forward contact.
+    Where loads depend on the history of the drive (it carries the base, or turns back in contact while the rod `rubs`)
+    the travel takes their place in `angles_in_sweep_frame`, [L] or [rad].
     """
 
     def __init__(self, measured: xr.Dataset, load_cell: LoadCell, rubs: bool = False) -> None:
@@ -47,12 +47,12 @@ class RecordSegments:
         self.bases = kinds[:, :2]  # pivots, or where drives begin [length], shape (segments, 2)
         self.backward = kinds[:, 2] > 0.0  # True for contact on the side of a backward sweep
         self.signs = np.where(self.backward, -1.0, 1.0)
+        self.signs_of_samples: Floats = self.signs[which]
         # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 where it has a history.
         self.senses = kinds[:, 3]
         self.angles_in_sweep_frame = np.where(self.backward[which], np.pi - angle, angle)
-        # Change of the travel with the reading of the encoder, shape (samples,): 0 if the drive carries the base, which
-        # turns no encoder.
-        self.pace = self.signs[which].copy()
+        # Change of the travel with the reading of the encoder, shape (samples,): 0 if the drive carries the base.
+        self.pace = self.signs_of_samples.copy()
         self._samples_by_errors: dict[bytes, Segments] = {}
         self._ways: dict[int, tuple[Floats, Floats]] = {}
         # Lines of all drives, (segments, lines, LINE_COLUMNS), NaN after the last; None if none has a history.
@@ -100,10 +100,7 @@ class RecordSegments:
         return path.lines
 
     def _turn(self, k: int, once: Floats, length: float, load_cell: LoadCell) -> Floats:
-        """Return the lines of a segment that turns back in contact; on the first the travel is the drive angle.
-
-        The rod was turned from a free angle to where the record begins.
-        """
+        """Return the lines of a segment that turns back in contact; the first is from a free angle."""
         own, backward = self.samples[k], bool(self.backward[k])
         free = np.append(once[0, :2], np.pi - _FREE if backward else _FREE)
         off = least_turn(once[:, 2], load_cell)
@@ -117,10 +114,7 @@ class RecordSegments:
         return lines
 
     def event_samples(self, loaded: Flags) -> Index:
-        """Return the samples between which the events of each segment lie, shape (segments, 4).
-
-        They are the last before contact, the first and the last in contact, and the next after it; −1 if there is none.
-        """
+        """Return the last sample before contact, the first and last in it, and the next, (segments, 4); −1 if none."""
         out = np.full((len(self), 4), -1)
         for row, own in zip(out, self.samples, strict=True):
             ordered = own[np.argsort(self.angles_in_sweep_frame[own], kind="stable")]
@@ -136,11 +130,6 @@ class RecordSegments:
         samples = self.event_samples(loaded)
         return np.where(samples >= 0, self.angles_in_sweep_frame[samples], np.nan)
 
-    @property
-    def signs_of_samples(self) -> Floats:
-        """`signs` of the segments of samples, shape (samples,)."""
-        return np.asarray(self.signs[self.of_sample])
-
     @cached_property
     def course(self) -> Course:
         """Order in which a discrepancy passes through the samples: along the drive, with one course for repeats."""
@@ -148,10 +137,7 @@ class RecordSegments:
         return Course.along(direction[self.of_sample] * self.angles_in_sweep_frame, self.samples)
 
     def ways(self, travels: Floats) -> Floats:
-        """Convert travels in the sweep frame, (n, segments), to ways of the base [length], or angles as read [rad].
-
-        Of a drive that turns back about a pivot it is the way since its first sample [rad].
-        """
+        """Convert travels, (n, segments), to ways of the base [length], or angles, as read or since the first [rad]."""
         ways = np.where(self.backward, np.pi - travels, travels)
         for k, known in self._ways.items():
             ways[:, k] = np.interp(travels[:, k], *known)

@@ -25,8 +25,7 @@ _FEWEST_BINS = 12  # least number of bins of a segment
 _MOST_SPLIT = 1.25  # largest number of bins after splitting, over that before
 _WIDEST = np.radians(2.0)  # largest width of a bin [rad]; loads between events are cubic in it to 1e-6 EI/L
 _DIVISIBLE = 8  # least number of readings of a bin that is split
-# Improvement of a bin by two straight lines in place of one, in variances of the noise for each channel, beyond which
-# it is split: without a bend its mean is 2.
+# Gain of two straight lines over one, in variances of each channel, that splits a bin: without a bend its mean is 2.
 _BEND = 4.0
 _SAME_ANGLE = 1e-12  # standard deviation of drive angles that is rounding [rad]
 _MARGIN, _MOST_SINGLE = 8, 200  # readings on either side of a snap-off that stay single, and the most around one
@@ -41,9 +40,8 @@ def shortened(record: xr.Dataset, cell: LoadCell, rubs: bool = False) -> tuple[x
     """Return a record as the likelihood takes it, and the load cell of its samples; `blocks` of the record states how.
 
     Of more than `MOST_SAMPLES`, blocks of readings at neighbouring drive angles are taken, two points on a straight
-    line for each; readings next to a snap-off stay single. For noise whose means are not normal (outliers, drift,
-    correlation, an uncertain encoder, coarse steps, the end of the range), for carried bases, and for drives that turn
-    back in contact if the rod `rubs`, every so many readings are.
+    line for each, single ones next to a snap-off; or every so many readings, for noise whose means are not normal (see
+    `_averages`), for carried bases, and for drives that turn back in contact if the rod `rubs`.
     """
     if not is_long(record):
         return record, cell

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +14,57 @@ from scipy.special import log_ndtr, ndtri_exp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
-from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
-from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, white_scales
-from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, Observer, linearised
+from tactile_bayes.inference.shape_free_posterior.observations import (
+    LinearPrior,
+    Observer,
+    joined,
+    linear_names,
+    linearised,
+    white_scales,
+)
+from tactile_bayes.numerics import chebyshev
+
+_NODE, _WEIGHT = np.polynomial.legendre.leggauss(24)  # of the quadrature between vertex and anchor
+_SLOPE_ANGLES = np.linspace(-1.4, 1.4, 57)  # slope angles that may be the anchor's [rad]
+_LARGEST = 50.0  # bound of the change of the logarithm of a radius, far beyond any prior
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """The point of a contour at one slope angle, and how far it is from where a linear map of the radii has it. An arc
+    that was touched stays at its distance from the vertex, linear in the log-radii near a centre only."""
+
+    slope_angle: float
+    centre: Floats  # logarithms of the radii, at the nodes of interpolation, around which the map is linear
+
+    @classmethod
+    def best(cls, centre: Floats, radii: Floats, vertex: Floats) -> Anchor:
+        """Return the anchor where a contour is known best. Shapes: centre (nodes,), radii, vertex (n, nodes)."""
+        anchors = [cls(float(angle), centre) for angle in _SLOPE_ANGLES]
+        spread = [np.sum(np.square(radii @ anchor._interpolation @ anchor._lengths + vertex)) for anchor in anchors]
+        return anchors[int(np.argmin(spread))]
+
+    @cached_property
+    def _interpolation(self) -> Floats:
+        """Logarithms of the radii between vertex and anchor from those at the nodes, shape (nodes, places)."""
+        count = self.centre.size
+        return np.asarray(chebyshev.coefficients(np.eye(count)).T @ chebyshev.basis(count, self._places / np.pi + 0.5))
+
+    @cached_property
+    def _places(self) -> Floats:
+        return 0.5 * self.slope_angle * (_NODE + 1.0)
+
+    @cached_property
+    def _lengths(self) -> Floats:
+        """Height and distance that each place contributes at the radii of the centre, shape (places, 2)."""
+        lengths = 0.5 * self.slope_angle * _WEIGHT * np.exp(self.centre @ self._interpolation)
+        return lengths[:, None] * np.column_stack([np.sin(self._places), np.cos(self._places)])
+
+    def beyond_line(self, log_radius: Floats) -> Floats:
+        """Return how far the anchor is above and to the right of where the linear map has it, shape (n, 2)."""
+        change = (log_radius - self.centre) @ self._interpolation
+        return np.asarray((np.expm1(np.minimum(change, _LARGEST)) - change) @ self._lengths)
+
 
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
 
@@ -56,9 +106,8 @@ class _SmoothNoise(NamedTuple):
 class NormalApproximation:
     """Normal distribution of the linear parameters, given amplitude, length scale and noise, `scales` of the model.
 
-    It is exact if loads and snap-offs are linear in the log-radii and in the rig, with the vertex moved by `bent`, and
-    priors are normal. Loads are linearised at a point; over the length scale, the map is interpolated. Parameters that
-    may vanish, like friction, have the positive part of the distribution alone.
+    It is exact if loads and snap-offs are linear in log-radii and rig, with the vertex moved by `bent`, and priors are
+    normal. Over the length scale, the map is interpolated. What may vanish, like friction, has the positive part alone.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
@@ -125,10 +174,8 @@ class NormalApproximation:
         return upper[:, :-1, -1], np.swapaxes(upper[:, :-1, :-1], 1, 2)
 
     def _triangular(self, scales: Floats) -> Floats:
-        """Return Lᵀ with L⁻¹b as last column, and below that the root of the least squares, up to sign.
-
-        Orthogonal transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15.
-        """
+        """Return Lᵀ with L⁻¹b as last column, and below that the root of the least squares, up to sign. Orthogonal
+        transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15."""
         through, certainty = self._information(scales)
         size, root = self.prior.mean.size, self.prior.root
         rows = np.zeros((len(scales), size + through.shape[1], size + 1))
@@ -138,19 +185,14 @@ class NormalApproximation:
         return upper * np.copysign(1.0, np.diagonal(upper, axis1=1, axis2=2))[..., None]
 
     def mean(self, scales: Floats) -> Floats:
-        """Return the mean of the linear parameters, shape (d,), given scales of shape (scales,).
-
-        Of parameters that may vanish it is the median.
-        """
+        """Return the mean of the linear parameters, (d,), given scales (scales,); of what may vanish the median."""
         pulled, root = self.conditional(scales[None])
         pulled += self.truncated(pulled, root, np.zeros(pulled.shape))[0]
         return np.asarray(solve_triangular(root[0].T, pulled[0]))
 
     def damped(self, scales: Floats, start: Floats, damping: Floats) -> Floats:
         """Return linear parameters, (n, d), after Levenberg–Marquardt steps from a start, (d,), with dampings (n,).
-
-        Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value.
-        """
+        Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value."""
         (through,), (certainty,) = self._information(scales[None])
         root = self.prior.root
         _, sizes, axes = np.linalg.svd(slopes := np.linalg.solve(root.T, through.T).T)
@@ -165,9 +207,7 @@ class NormalApproximation:
 
     def truncated(self, pulled: Floats, root: Floats, normal: Floats) -> tuple[Floats, Floats]:
         """Return numbers, (n, d), for which parameters that may vanish are positive, and the log-determinant, (n,).
-
-        These come last and Lᵀ is upper triangular, so that each depends on its own number and later ones only.
-        """
+        These come last and Lᵀ is upper triangular, so that each depends on its own number and later ones only."""
         normal, growth = normal.copy(), np.zeros(len(normal))
         for k, least in self._least(pulled, root, normal):
             whole = log_ndtr(-least)

@@ -11,14 +11,57 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.shape_free_posterior.columns import linear_names, white_scales
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
+from tactile_bayes.rig.parameters import MAY_VANISH
+
+_OF_ROUGHNESS = ("amplitude", "length_scale")
+
+
+def scale_names(model: ContourModel) -> tuple[str, ...]:
+    """Return the parameters in which loads are not linearised."""
+    return (*_OF_ROUGHNESS, *model.noise.names)
+
+
+def linear_names(model: ContourModel) -> tuple[str, ...]:
+    """Return the parameters in which loads are linearised, lengths by logarithms; those that may vanish come last."""
+    rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
+    return (*rough, *sorted(model.unknowns.names, key=MAY_VANISH.__contains__))
+
+
+def logarithms(model: ContourModel) -> list[int]:
+    """Return the places of those of the linear parameters that are logarithms: of r, and of the length of a flat."""
+    names = linear_names(model)
+    return [names.index(name) for name in ("r", "flat_length") if name in names]
+
+
+def white_scales(model: ContourModel) -> slice:
+    """Return the place of the white noise among the scales."""
+    return slice(len(_OF_ROUGHNESS), len(_OF_ROUGHNESS) + len(model.noise.of_white))
+
+
+def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
+    """Return scales (amplitude, length scale, noise), (n, scales), and linear parameters, (n, d), of points."""
+    values = model.values(points)
+    linear = np.stack([values[name] for name in linear_names(model)], axis=1)
+    of_lengths = logarithms(model)
+    linear[:, of_lengths] = np.log(linear[:, of_lengths])
+    return np.stack([values[name] for name in scale_names(model)], axis=1), linear
+
+
+def joined(model: ContourModel, scales: Floats, linear: Floats) -> Floats:
+    """Return the model's parameters, (n, parameters), from scales and linear parameters."""
+    names = (*scale_names(model), *linear_names(model))
+    points = np.empty((len(linear), len(names)))
+    linear, of_lengths = linear.copy(), logarithms(model)
+    linear[:, of_lengths] = np.exp(linear[:, of_lengths])
+    points[:, [model.names.index(name) for name in names]] = np.hstack([scales, linear])
+    return points
+
 
 _HUBER_THRESHOLD = 4.0  # residual in standard deviations from which Huber's loss is linear
 _MIN_WIDTH = 0.01  # smallest standard deviation of a snap-off, over half a step of the drive angle
-# Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
-# of the further ones.
+# Step of the first differences of loads, over the scale of each coordinate, and the largest step of further ones.
 _STEP, _LARGEST_STEP = 1e-5, 0.01
 _FURTHER_DIFFERENCES = 2  # number of times that differences are taken again
 _MIN_CHANGE = 0.03  # least singular value of residuals that counts, in deviations per prior scale
@@ -40,10 +83,8 @@ class Observer:
         self._width = self._within / np.sqrt(3.0)
 
     def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, Flags, Floats]:
-        """Return residuals of readings over `noise`, samples loaded as measured, and residuals of snap-offs.
-
-        They are expected less measured; shapes (n, samples, 3), (n, samples) and (n, sweep segments that end).
-        """
+        """Return residuals (expected less measured) over `noise`, samples loaded alike, and residuals of snap-offs.
+        Shapes (n, samples, 3), (n, samples) and (n, sweep segments that end)."""
         model, rig = self.model, self.model.unknowns.rig(values)
         loads, _, events = model.likelihood.predict_with_events(contours, rig)
         agree = (loads != 0.0).any(axis=2) == self.loaded
@@ -93,10 +134,7 @@ class Observations(NamedTuple):
 
 def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> Observations:
     """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
-
-    Differences along the parameters give rough slopes, and steps of about a deviation along their singular vectors
-    better ones.
-    """
+    Differences along the parameters give rough slopes, and steps along their singular vectors better ones."""
     model = observer.model
     family = model.family
     assert isinstance(family, ShapeFreeFamily)

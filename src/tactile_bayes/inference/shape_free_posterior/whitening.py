@@ -11,11 +11,18 @@ from scipy.optimize import minimize
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, logarithms, scale_names, split
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
-from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, Observer
+from tactile_bayes.inference.shape_free_posterior.observations import (
+    LinearPrior,
+    Observer,
+    joined,
+    linear_names,
+    logarithms,
+    scale_names,
+    split,
+)
 
 _FAR = 4.0  # largest distance of the logarithm of a scale from its starting value; the density is zero beyond
 _LARGEST = 50.0  # bound of the logarithm of a radius, far beyond any prior
@@ -29,11 +36,8 @@ _DRAWS = 4000  # number of draws from a prior for its mean and standard deviatio
 
 @dataclass(frozen=True, eq=False)
 class Whitening(Coordinates):
-    """A change of variables by a normal approximation, whose quality affects efficiency, not exactness.
-
-    The coordinates are the logarithms of the scales, and the other parameters, standardised by the mean and covariance
-    that the approximation gives at these scales; of those that may vanish by the positive part of that distribution.
-    """
+    """Logarithms of the scales, and all else standardised by the mean and covariance of a normal approximation there.
+    Of what may vanish, by the positive part of that distribution. The fit affects efficiency, not exactness."""
 
     approximation: NormalApproximation
     scales: Floats  # amplitude, length scale and noise at the centre of the walkers' starting points, shape (bent,)
@@ -99,10 +103,8 @@ class Whitening(Coordinates):
 
 
 def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:
-    """Return whitening coordinates at the posterior's mode, which is sought from a point, shape (parameters,).
-
-    Damped Gauss–Newton steps alternate with the most probable scales, and snap-offs that are missed become sharper.
-    """
+    """Return whitening coordinates at the posterior's mode, which is sought from a point, shape (parameters,). Damped
+    Gauss–Newton steps alternate with the most probable scales, and snap-offs that are missed become sharper."""
     observer, prior = Observer(model), _linear_prior(model, rng)
     (scales,), (linear,) = split(model, point[None])
     best, found = -np.inf, (-np.inf, scales, linear)
@@ -130,10 +132,8 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
 
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:
-    """Return the most probable scales near the given ones.
-
-    White noise is at least half the scatter: less would stop a search far from the mode at the first bend of its ridge.
-    """
+    """Return the most probable scales near the given ones, with white noise of half the scatter at least. Less would
+    stop a search far from the mode at the first bend of its ridge."""
     names = scale_names(model)
     columns = [model.names.index(name) for name in names]
 

@@ -51,10 +51,7 @@ def gather(
     ends: Ends = ANYTHING,
 ) -> Cloud:
     """Return a distribution of starting points that is wider than the posterior and mostly of comparable probability.
-
-    While most points drawn around the centre are far less probable than the best, as just beyond a snap-off, where a
-    walker would be lost, centre and covariance are estimated from the best fifth (cross-entropy method).
-    """
+    While most points are far less probable than the best, centre and covariance are those of the best fifth."""
     size = centre.size
     top = float(log_probability(centre[None])[0])
     for _ in range(_ROUNDS):

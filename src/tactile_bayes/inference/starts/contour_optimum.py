@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,10 @@ import numpy as np
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import Logarithms
+from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.least_squares import HUBER_THRESHOLD, STEP, Optimum, descend, optima
+from tactile_bayes.inference.least_squares import HUBER_THRESHOLD, STEP, Optimum, Residuals, descend, optima
+from tactile_bayes.inference.misfit import is_inferred
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
@@ -26,17 +28,14 @@ _PRIOR_DRAWS = 1000
 _PRIOR_QUANTILES = 25
 _STEP_OF_ADDED = 0.2  # of the differences by a parameter that is added, in prior standard deviations
 _FARTHEST = 2.0  # longest step to first order, in prior standard deviations of a parameter
-# Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
-# early, since a sample at an event is loaded or not.
-_CANDIDATES = 24
+_CANDIDATES = 24  # most prior draws from which searches begin, the likeliest first: from too far away they stop early
 _SMOOTH_STARTS = 6  # of these from which contours without roughness are sought
 _EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
 _MAX_LOG_DISTANCE = 12.0  # of the log of a parameter from its prior median in a search, in prior spreads
 _DECAY = 5.0  # lags after which a load that has ended is a hundredth of itself
 _MISSING_EVENT_RESIDUAL = 1000.0  # residual of an event that does not occur
 _MAX_RELATIVE_SD = 2.0  # of a contact normal to the contour, over the median one, for a fit
-# Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
-# per residual there below which the gain is believed.
+# Gain in log-likelihood beyond a prior's end that shows it to be too narrow, and the cost per residual to believe it.
 _MIN_GAIN, _MAX_COST = 100.0, 5.0
 _DISCREPANCY_SPREAD = 0.4  # deviation of the logs of its scale and length, before they are known
 _MAX_RESIDUAL = 100.0  # largest residual in standard deviations from which a discrepancy is estimated
@@ -157,11 +156,9 @@ class FirstOrder(NamedTuple):
 
 
 def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence[Sequence[str]]) -> list[FirstOrder]:
-    """Return what each group of added parameters explains beside a start, the optimum of the model without them.
-
-    With the score s of a group, and its information S, less what the other parameters explain, both in prior standard
-    deviations, it is ½ (sᵀ S⁻¹ s − log det S) by Laplace's approximation (Rao's score test, and its price).
-    """
+    """Return what each group of added parameters explains beside a start, the optimum of the model without them. It is
+    ½ (sᵀ S⁻¹ s − log det S), Laplace's approximation, of the score s of a group and its information S, less what the
+    others explain, both in prior standard deviations (Rao's score test, and its price)."""
     search, names = _Search(model, _prior_quantiles(model), NEVER), model.forward_parameters
     place = search.coordinates.of(search.named(start)[None])[0] / search.spread
     residuals, loose = search.residuals((place * search.spread)[None])[0], set().union(*added)
@@ -171,7 +168,7 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
         return central_slopes(lambda points: search.residuals(points * search.spread), place, steps)
 
     slopes = slopes_over(STEP)
-    for i in [i for i, name in enumerate(names) if name in loose and name.removesuffix("_seconds").endswith("lag")]:
+    for i in [i for i, name in enumerate(names) if name in loose and is_inferred("lag", [name])]:
         there = place + np.eye(place.size)[i]  # the derivative by a lag vanishes where it does
         slopes[:, i] = search.residuals((there * search.spread)[None])[0] - residuals
     # Where a parameter is as stated, another solution of the rod may take over, a little off, as if all loads jumped.
@@ -193,16 +190,12 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
             which = [i for i in which if i not in wrong]
         alone = np.linalg.solve(precision[np.ix_(own, own)], score[own])
         gain = 0.5 * (score[both] @ step - score[own] @ alone)
-        price = 0.5 * (_log_det(precision[np.ix_(both, both)]) - _log_det(precision[np.ix_(own, own)]))
+        of_both, of_own = (np.linalg.slogdet(precision[np.ix_(some, some)]).logabsdet for some in (both, own))
         moved = place.copy()
         moved[both] += np.clip(step, -_FARTHEST, _FARTHEST)
         point = search.points((moved * search.spread)[None])[0]
-        found.append(FirstOrder(float(gain - price), dict(zip(names, point.tolist(), strict=True))))
+        found.append(FirstOrder(float(gain - 0.5 * (of_both - of_own)), dict(zip(names, point.tolist(), strict=True))))
     return found
-
-
-def _log_det(matrix: Floats) -> float:
-    return float(np.linalg.slogdet(matrix).logabsdet)
 
 
 def _prior_quantiles(model: ContourModel) -> Floats:
@@ -249,10 +242,8 @@ class _Search:
         return np.array([start.get(name, value) for name, value in pairs])
 
     def residuals(self, coordinates: Floats) -> Floats:
-        """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too.
-
-        A bias that the likelihood integrates out is whitened with the noise.
-        """
+        """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too. A
+        bias that the likelihood integrates out is whitened with the noise."""
         model, points, size = self.model, self.points(coordinates), self.middle.size
         least = np.where(model.may_vanish, -model.high, model.low)[:size]
         allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
@@ -287,15 +278,19 @@ class _Search:
         fitted = self._at_contacts()
         if fitted is not None:
             yield fitted
-        parts = [self.drawn[block] for block in blocks(len(self.drawn), self.measured.size)]
-        costs = np.concatenate([np.sum(np.minimum(np.abs(self.residuals(part)), 30.0), axis=1) for part in parts])
+        yield from islice(self._likeliest(self.residuals, self.drawn, self.middle, self.spread), _CANDIDATES)
+
+    def _likeliest(self, residuals: Residuals, drawn: Floats, middle: Floats, spread: Floats) -> Iterator[Floats]:
+        """Yield drawn coordinates, the likeliest first, each moved until events are in their brackets."""
+        parts = [drawn[block] for block in blocks(len(drawn), self.measured.size)]
+        costs = np.concatenate([np.sum(np.minimum(np.abs(residuals(part)), 30.0), axis=1) for part in parts])
 
         def missed(coordinates: Floats) -> Floats:
-            return self.residuals(coordinates)[:, self.measured.size :]
+            return residuals(coordinates)[:, self.measured.size :]
 
-        for place in self.drawn[np.argsort(costs)[:_CANDIDATES]]:
+        for place in drawn[np.argsort(costs)]:
             if self.brackets.low.size and not self.deadline.has_passed:
-                yield descend(missed, place, self.middle, self.spread, deadline=self.deadline).point
+                yield descend(missed, place, middle, spread, deadline=self.deadline).point
             else:
                 yield place
 
@@ -314,19 +309,10 @@ class _Search:
         def residuals(some: Floats) -> Floats:
             return self.residuals(whole(some))
 
-        def missed(some: Floats) -> Floats:
-            return residuals(some)[:, self.measured.size :]
-
-        drawn = self.drawn[:, free]
-        costs = np.sum(np.minimum(np.abs(residuals(drawn)), 30.0), axis=1)
         middle, spread, low, high = (limit[free] for limit in self.limits[:4])
-        best: Optimum | None = None
-        for place in drawn[np.argsort(costs)[:_SMOOTH_STARTS]]:
-            if self.brackets.low.size:
-                place = descend(missed, place, middle, spread, deadline=self.deadline).point
-            found = next(optima(residuals, [place], middle, spread, low, high, self.deadline))
-            best = found if best is None or found.cost < best.cost else best
-        assert best is not None
+        places = islice(self._likeliest(residuals, self.drawn[:, free], middle, spread), _SMOOTH_STARTS)
+        found = optima(residuals, places, middle, spread, low, high, self.deadline)
+        best = min(found, key=lambda one: one.cost)
         covariance = np.diag(np.square(self.spread))
         return Optimum(whole(best.point[None])[0], covariance, best.residuals, best.cost)
 
@@ -418,10 +404,8 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
 
 
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
-    """Return the contour parameters fitted to Step 2's contacts with a rig, None if few are usable.
-
-    The rig's default has the zeros of the unloaded samples; None stands also for a rig that is far from the stated one.
-    """
+    """Return the contour parameters fitted to Step 2's contacts with a rig; None if few are usable, or it is far off.
+    The rig's default has the zeros of the unloaded samples."""
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None
     rod = model.likelihood.rod

@@ -9,19 +9,16 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
-from tactile_bayes.inference.coordinates.flank import FlankCoordinates
+from tactile_bayes.inference.coordinates import Coordinates, FlankCoordinates, in_coordinates
 from tactile_bayes.inference.deadline import Deadline
-from tactile_bayes.inference.densities import ANYTHING, Ends, Proposal
-from tactile_bayes.inference.importance import EFFICIENT, approximate
+from tactile_bayes.inference.densities import ANYTHING, EFFICIENT, Ends, Proposal, approximate
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather, square_root
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, are_alike, optima_of
 
 _MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
 _MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a record of few loaded samples
-# Searches that end in known modes, after which no other mode is expected: for a record of many loaded samples, and for
-# any record if the posterior is nearly normal around the last mode found.
+# Searches that end in known modes after which no other is expected: with many loaded samples, or a normal last mode.
 _REPEATS, _REPEATS_FEW_SAMPLES = 2, 4
 # Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred: a
 # ridge that bends beyond the draws of the importance sampling looks straight.

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import in_coordinates
+from tactile_bayes.inference.coordinates import in_coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal, effective_number, normalised
 from tactile_bayes.inference.ensembles.moves import FittedMove, step_ensembles
 from tactile_bayes.inference.streams.stream_state import WIDER, StreamState
@@ -22,22 +22,17 @@ from tactile_bayes.numerics.selection import resampled
 # Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
 # samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution.
 _PARTS = 8
-# Shares of accepted proposals below which a mixture takes the place of a single distribution, and above which a single
-# one is tried again.
+# Shares of accepted proposals below which a mixture is taken, and above which a single distribution is tried again.
 _POOR, _GOOD = 0.3, 0.45
 # Shares of steps by differences of particles, and where hardly any proposal of a fitted distribution is accepted.
 _DIFFERENCES, _MOSTLY_DIFFERENCES = 0.1, 0.5
 _HARDLY = 0.1  # share of accepted proposals below which that is so
-# Increase of the mean log-density in a step, over the standard error of that mean, of particles that are on their way
-# to where the density is larger.
-_RISING = 3.0
+_RISING = 3.0  # increase of the mean log-density in a step, in standard errors, of particles on their way up
 
 
 class Mover:
-    """Moves particles by distributions fitted to half of them, now and then by differences.
-
-    `rises`: the mean log-density rose in the last step of a fitted distribution by more than chance explains.
-    """
+    """Moves particles by distributions fitted to half of them, now and then by differences. `rises`: the mean
+    log-density rose in the last step of a fitted distribution by more than chance explains."""
 
     def __init__(self, model: ContourModel, random: np.random.RandomState) -> None:
         ends = model.walked_ends
@@ -83,11 +78,8 @@ _MOST_STAGES = 200  # of an update
 
 class Particles:
     """Weighted particles of the record so far, from those of the record before, or from the prior (None).
-
-    `log_integral` is that of prior times likelihood over contours within reach; `log_ratios` are predictive densities
-    of the new samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in
-    `Stream.update`.
-    """
+    `log_integral` is that of prior times likelihood within reach; `log_ratios` are predictive densities of the new
+    samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in `Stream.update`."""
 
     def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:
         self.model = model
@@ -104,7 +96,9 @@ class Particles:
         else:
             self._before = old.experiment.model
             self._added = [name for name in model.names if name not in self._before.names]
-            self.points = self._extended(old, random)
+            columns = dict(zip(self._before.names, old.points.T, strict=True))
+            columns |= {name: model.priors[name].rvs(count, random_state=random) for name in self._added}
+            self.points = np.stack([columns[name] for name in model.names], axis=1)
             self.log_weights, self.log_integral = old.log_weights, old.log_integral
         self._coordinates = model.coordinates
         self._is_continued = _is_continued(self._before, model)
@@ -114,22 +108,9 @@ class Particles:
         self._run()
         self.log_ratios = np.asarray(expected - self.log_integral)
 
-    def _extended(self, old: StreamState, random: np.random.Generator) -> Floats:
-        """Return the particles with new parameters drawn from their priors."""
-        names, count = old.experiment.model.names, len(old.points)
-        columns = [
-            old.points[:, names.index(name)]
-            if name in names
-            else self.model.priors[name].rvs(count, random_state=random)
-            for name in self.model.names
-        ]
-        return np.stack(columns, axis=1)
-
     def _with_wider_noise(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the log-density of points, (n,), and that of new samples with wider noise, (n, factors).
-
-        It is NaN if there is a discrepancy, which may couple a sample to later ones.
-        """
+        """Return the log-density of points, (n,), and that of new samples with wider noise, (n, factors). It is NaN if
+        there is a discrepancy, which may couple a sample to later ones."""
         model = self.model
         values, wider = model.log_prior(points), np.full((len(points), len(WIDER)), -np.inf)
         had = 0 if self._before is None else len(self._before.likelihood.measured)

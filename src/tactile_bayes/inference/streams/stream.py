@@ -18,22 +18,26 @@ from tactile_bayes.checks import check_function, check_numbers, check_path, chec
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import unit_of, whole_groups
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import identity_of
 from tactile_bayes.inference.densities import effective_number, normalised
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings
-from tactile_bayes.inference.ensembles.checkpoint import changes
-from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.experiment import Experiment, identity_of
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
-from tactile_bayes.inference.streams.growing_record import continued
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, Particles
-from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, surprise_after, tree_of
+from tactile_bayes.inference.streams.stream_state import (
+    StreamState,
+    continued,
+    read_tree,
+    state_in,
+    surprise_after,
+    tree_of,
+)
 from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.tasks import versions_of
+from tactile_bayes.tasks import differences, versions_of
 
 LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # levels of the quantiles of parameters and of the band
 _MOST_SURPRISE = 700.0  # largest logarithm of an e-value that is stated, which is finite
@@ -303,17 +307,14 @@ class Stream:
             own = validate(record).isel(sample=slice(0, own.sizes["sample"]))
         experiment = Experiment(own, self._rig, self._family)
         state = StreamState(own, experiment, **numbers)
-        differing = changes(identity, self._identity(experiment))
+        differing = differences(identity, self._identity(experiment), most=20)
         if not differing:
             with threadpool_limits(1):
                 values = experiment.model.log_probability(state.points)
             if not np.allclose(values, state.values, rtol=1e-9, atol=1e-6):
-                differing = ["the log-density of the particles, by a prior or the load cell"]
+                differing = "by a prior or the load cell, the log-density of the particles is another"
         if differing:
-            raise InferenceError(
-                f"{path} is of another stream, which differs in {'; '.join(differing)}: give another file, or what was "
-                "given then"
-            )
+            raise InferenceError(f"{path} is of another stream: {differing}; give another file, or what was given then")
         self._state = state
 
     def contour_draws(self, count: int) -> Floats:

@@ -1,4 +1,4 @@
-"""Coordinates of contours, or of a flank of joined ones, with contacts on one flank only."""
+"""Coordinates in which parameters are sampled: themselves, logarithms of some, or those of a flank of a contour."""
 
 from __future__ import annotations
 
@@ -7,14 +7,62 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours.families import FLANKS, sides_of
 from tactile_bayes.contours.family import VERTEX
-from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
+from tactile_bayes.inference.densities import LogProbability, Mixture
 from tactile_bayes.numerics.differences import central_slopes
 
-# Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
-# lie on the other side as well, which these coordinates exclude.
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Coordinates:
+    """A change of variables between coordinates and as many parameters; here they are the same."""
+
+    proposal: Mixture | None = None  # of the coordinates, near the posterior, if one is known
+
+    @property
+    def bent(self) -> int | None:
+        """Number of the first coordinates, if all others are nearly standard normal."""
+        return None
+
+    def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        """Return parameters, (n, parameters), and the log of the Jacobian determinant of the map to them, (n,)."""
+        return coordinates, np.zeros(len(coordinates))
+
+    def of(self, points: Floats) -> Floats:
+        """Return the coordinates of points, shape (..., parameters)."""
+        return points
+
+
+@dataclass(frozen=True, eq=False)
+class Logarithms(Coordinates):
+    """The logarithms of some positive parameters, and the others themselves: ratios of powers then lie along a line."""
+
+    positive: Flags
+
+    def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        points = coordinates.copy()
+        with np.errstate(over="ignore"):  # infinite parameters are impossible
+            points[:, self.positive] = np.exp(coordinates[:, self.positive])
+        return points, np.sum(coordinates[:, self.positive], axis=1)
+
+    def of(self, points: Floats) -> Floats:
+        coordinates = points.copy()
+        coordinates[..., self.positive] = np.log(points[..., self.positive])
+        return coordinates
+
+
+def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) -> LogProbability:
+    """Return the log-density of the coordinates, from that of the parameters."""
+
+    def log_density(points: Floats) -> Floats:
+        parameters, log_jacobian = coordinates.parameters(points)
+        return np.asarray(log_probability(parameters) + log_jacobian)
+
+    return log_density
+
+
+# Share of the draws, and distance from x over its median: if a larger share is nearer, the vertex may lie beyond x.
 _MAX_SHARE, _NEAR = 0.01, 0.1
 _STEP = 1e-6  # of central differences in the base's coordinates
 
@@ -83,11 +131,11 @@ _FLANKS: dict[str, tuple[Callable[..., tuple[Floats, ...]], Callable[..., tuple[
 class FlankCoordinates(Coordinates):
     """Slope, shape, height and slope ratio of a contour at one x, instead of its sizes, q and x_c.
 
-    A record of one flank hardly determines the vertex: sizes and vertex then lie along a bent ridge. With the slope t,
-    the coordinates are log t, for two sizes the logarithm of a shape, the height y and log(t/t′). With u = |x − x_c|,
-    for a power law t = n (u/w)^(n − 1), the shape is n − 1, y = q + t u/n and t/t′ = u/(n − 1); for an ellipse with u =
-    a sin τ, t = (b/a) tan τ, the shape is tan τ, y = q + b (1 − cos τ) and t/t′ = u cos² τ. A parabola is a power law
-    of n = 2, and a circle an ellipse of b = a, without a shape.
+    A record of one flank hardly determines the vertex: sizes and vertex then lie along a bent ridge. With u = |x − x_c|
+    and the slope t, the coordinates are log t, for two sizes the log of a shape, the height y, and log(t/t′). For a
+    power law t = n (u/w)^(n − 1), the shape is n − 1, y = q + t u/n, t/t′ = u/(n − 1); for an ellipse with u = a sin τ,
+    t = (b/a) tan τ, the shape is tan τ, y = q + b (1 − cos τ), t/t′ = u cos² τ. A parabola has n = 2, a circle b = a,
+    without a shape.
     """
 
     flank: str  # of `FLANKS`

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 from helpers.contour_posteriors import CELL, swept
+from tactile_bayes import Family, Rig
 from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle
 from tactile_bayes.contours.families import FAMILIES
-from tactile_bayes.inference.coordinates.base import Logarithms
-from tactile_bayes.inference.coordinates.flank import FlankCoordinates
+from tactile_bayes.inference.coordinates import FlankCoordinates, Logarithms
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.starts.modes import flank_at_contacts
-from tactile_bayes.rig import Rig
 
 PLACE = 0.1
 # The parameters that are sizes, of those of the family and one of the rig.

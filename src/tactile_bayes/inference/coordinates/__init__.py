@@ -1,1 +1,0 @@
-"""Coordinates in which parameters are sampled."""
