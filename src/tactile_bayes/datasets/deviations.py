@@ -93,9 +93,8 @@ def is_around_the_stated(key: str, variation: Variation) -> bool:
 def drawn_deviations(
     spec: Specification, values: Mapping[str, Floats], shares: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """Return the deviations that are drawn around what data sheets state, by the keys of their distributions.
-
-    Shapes: values (n,), shares (n,).
+    """Return the deviations that are drawn around what data sheets state, shape (n,) each, by the keys of their
+    distributions.
     """
     drawn = {name: v for name, v in spec.unknown.items() if v.kind not in _DISCRETE}
     if not drawn:
@@ -130,10 +129,7 @@ def _stated(values: Mapping[str, Floats], count: int) -> Stated:
 
 
 def as_built(spec: Specification, values: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the numbers of rods, load cells and pivots with the deviations from what data sheets state.
-
-    Shapes: values (n,).
-    """
+    """Return the numbers of rods, load cells and pivots, shape (n,), with the deviations from what data sheets state."""
     built = dict(values)
     off = {name: values[f"unknown.{name}"] for name in spec.unknown}
     if off:

@@ -90,12 +90,9 @@ _CORRECTIONS = {
 
 @threadpool_limits.wrap(limits=1)  # with more threads, products of matrices are rounded otherwise
 def generate_records(spec: Specification, begin: int, end: int) -> Records:
-    """Generate records from index `begin` to before `end`, each the first draw that all sweeps reach and leave clear.
-
-    The number of draws ahead doubles for the remaining records each time, since most of the cost is per call. The
-    random numbers of a record depend on the seed and its index only, and those of its contour are drawn before all
-    others. Rounding may depend on the records that are generated together: only the same range of records gives
-    identical bits.
+    """Generate records from index `begin` to before `end`, each the first draw that all sweeps reach and leave clear;
+    the draws ahead double for the remaining records. Random numbers of a record depend on seed and index only, those of
+    its contour come first; rounding may depend on the records generated together: the same range gives identical bits.
     """
     index = np.arange(begin, end)
     drawn = {key: np.full(index.size, np.nan) for key in spec.numbers}

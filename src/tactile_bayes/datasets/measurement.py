@@ -46,9 +46,8 @@ def measure(
     sample: dict[str, NDArray[Any]],
     backward: NDArray[np.int8],
 ) -> None:
-    """Add the readings of load cells as they are built to the true values, each record with random numbers of its own.
-
-    Directions are 0 forward, 1 backward.
+    """Add the readings of load cells as they are built to the true values, each record with random numbers of its own,
+    in the directions 0 forward, 1 backward.
     """
     count = len(noise)
     columns = {key.removeprefix("load_cell."): v for key, v in built.items() if key.startswith("load_cell.")}

@@ -15,10 +15,8 @@ _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
 
 
 def netcdf_of(dataset: xr.Dataset) -> list[memoryview]:
-    """Return a dataset of numbers as NetCDF 4: HDF5 with dimension scales, as the specification of the format defines.
-
-    It is made in memory, since HDF5 aborts the process if it cannot write, as on a full disk. The same dataset gives
-    the same bytes with the same libraries.
+    """Return a dataset of numbers as NetCDF 4: HDF5 with dimension scales, as the specification of the format defines,
+    made in memory, since HDF5 aborts the process if it cannot write. Equal datasets give equal bytes.
     """
     found = []
     for before, name in _frame(_Template(dataset)):

@@ -49,10 +49,8 @@ class Group:
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive angles of a sweep: `samples` evenly spaced ones from `begin` to `end` [rad], or about the contact.
-
-    About the contact, `margin` is the range before first contact and after snap-off, in shares of the angle between
-    them.
+    """Drive angles of a sweep: `samples` evenly spaced ones from `begin` to `end` [rad], or about the contact, with
+    `margin` before first contact and after snap-off, in shares of the angle between them.
     """
 
     samples: int

@@ -37,9 +37,8 @@ class ContactBounds:
 
 
 def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> ContactBounds:
-    """Find contact, its onset and its snap-off in one sweep; the method is that of `zero_load`.
-
-    Shapes: readings (samples, channels), floor (channels,).
+    """Find contact, its onset and its snap-off in one sweep, by the method of `zero_load`. Shapes: readings (samples,
+    channels), floor (channels,).
     """
     n = len(readings)
     readings = readings - readings[0]
@@ -103,9 +102,8 @@ def _contact(readings: Floats, floor: Floats) -> tuple[float, int, int]:
 
 
 def _course(readings: Floats, floor: Floats) -> float:
-    """Upper bound of the p-value of no contact, from a course of the readings that is smooth and large.
-
-    A parabola is fitted to each channel (an F-test, exact in white normal noise); 1 if none spans `_FIRM` deviations.
+    """Upper bound of the p-value of no contact, from a course of the readings that is smooth and large: a parabola for
+    each channel (an F-test, exact in white normal noise); 1 if none spans `_FIRM` deviations.
     """
     n, channels = readings.shape
     if n < _FEWEST_OF_COURSE:
@@ -124,9 +122,8 @@ def _course(readings: Floats, floor: Floats) -> float:
 
 
 def _clipped(readings: Floats, floor: Floats) -> Floats:
-    """Clip readings that exceed both neighbours, at three deviations from the median or at the neighbour.
-
-    Nothing is clipped where half of the readings are equal.
+    """Clip readings that exceed both neighbours, at three deviations from the median or at the neighbour, unless half
+    of the readings are equal.
     """
     off = readings - np.median(readings, axis=0)
     deviation = DEVIATION_OVER_MEDIAN * np.median(np.abs(off), axis=0)
@@ -212,9 +209,8 @@ def _neighboured(z: Floats) -> Flags:
 
 
 def _last_before_ramp(readings: Floats, loaded: int, after: int, false_alarm: float, floor: Floats) -> int:
-    """Lower limit of the last unloaded sample, for a load that grows linearly from zero up to the loaded sample.
-
-    Bias and slope are fitted by least squares for every possible start of the ramp; samples after contact are included.
+    """Lower limit of the last unloaded sample, for a load that grows linearly from zero up to the loaded sample: bias
+    and slope are least squares for every possible start of the ramp; samples after contact are included.
     """
     n, channels = readings.shape
     known = np.concatenate([readings[: loaded + 1], readings[max(n - after, loaded + 1) :]])

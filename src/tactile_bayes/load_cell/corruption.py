@@ -23,9 +23,7 @@ def corrupted_loads(
     times: Floats | None = None,
 ) -> Floats:
     """Simulate readings of loads: memory, lever, gain and bias, drift, noise and discrepancy, the range, and the steps.
-
-    Shapes: loads (..., samples, 3), noise_scale (..., 3), times [s] (samples,) → (..., samples, 3); `zeros` add to the
-    bias.
+    Shapes: loads (..., samples, 3), noise_scale (..., 3), times [s] (samples,); `zeros` add to the bias.
     """
     noise = rng.standard_normal(loads.shape)
     if any(sheet.correlation):

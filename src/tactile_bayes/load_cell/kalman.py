@@ -1,10 +1,9 @@
 """Kalman filter and smoother of readings with drift, bias, a discrepancy and white noise, compiled.
 
-The reading of a channel is weight · g + drift + bias + white noise. g is a Gaussian process of variance one and the
-covariance (1 + rate · d) exp(−rate · d) over the distance d: Matérn's with ν = 3/2, the state of which is g and its
-derivative over the rate (Hartikainen and Särkkä 2010, doi 10.1109/MLSP.2010.5589113). The other states are drift and
-bias. Beside a drift that does not decay, a bias is a part of it; beside one that does, without a discrepancy, it is a
-regression on the filter's response to ones, which holds for a bias that is hardly known.
+The reading of a channel is weight · g + drift + bias + white noise; the state of g, a Gaussian process with Matérn's
+covariance for ν = 3/2, is g and its derivative over the rate (Hartikainen and Särkkä 2010, doi
+10.1109/MLSP.2010.5589113). Beside a drift that does not decay, a bias is a part of it; beside one that does, without a
+discrepancy, it is a regression on the filter's response to ones, which holds for a bias that is hardly known.
 """
 
 from __future__ import annotations
@@ -83,9 +82,7 @@ def _run(
     course = Course(np.arange(shape[-2]), np.ones(shape[-2])) if discrepancy is None else discrepancy.course
     arrays = [np.broadcast_to(values, shape).reshape(-1, *shape[-2:]) for values in (residual, noise, weight)]
     arrays.append(np.broadcast_to(rate, shape[:-2]).ravel())
-    arrays.append(
-        np.stack([np.broadcast_to(v, (*shape[:-2], 1, shape[-1])).reshape(-1, shape[-1]) for v in of_zero])
-    )
+    arrays.append(np.stack([np.broadcast_to(v, (*shape[:-2], 1, shape[-1])).reshape(-1, shape[-1]) for v in of_zero]))
     # Arrays that are read only, or lie otherwise in memory, would each be another type, for which all is compiled anew.
     residual, noise, weight, rate, wandering = (np.require(values, requirements=["C", "W"]) for values in arrays)
     found = np.empty(residual.shape), np.empty(residual.shape)

@@ -18,9 +18,8 @@ from tactile_bayes.record import CHANNELS
 
 
 class LoneSamples:
-    """Readings, each of which is judged by itself: unknown bias and drift count as noise of that sample.
-
-    The readings, shape (n, 3), are in the sheet's units and frame, from the first sample of a record on, and complete.
+    """Readings, each of which is judged by itself: unknown bias and drift count as noise of that sample. They have the
+    shape (n, 3), in the sheet's units and frame, from the first sample of a record on, and are complete.
     """
 
     def __init__(self, sheet: DataSheet, readings: Floats) -> None:

@@ -34,15 +34,9 @@ def is_bag(path: Path) -> bool:
 
 
 def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read the fields of messages that a record needs, one sample for each message with the first load.
-
-    Drive angle and base are interpolated linearly to its time, an angle after its jumps by a turn are undone; other
-    loads are those of the nearest message, and everything else is that of the last one. A sample is left out if another
-    column has no values around it, or pauses there for more than five times its usual interval. The column "time" is
-    that since the first sample [s].
-
-    Times are those of headers, or all those of reception if headers of a topic go back, state one time for different
-    values, or have another clock than other topics. A message that is in the bag again counts once.
+    """Read the fields of messages that a record needs, one sample for each message with the first load, whose time is
+    "time" [s]; by headers, or by reception if their times cannot be right. Fields are interpolated (angle and base),
+    nearest (loads) or last; samples in a pause of another field are left out, and repeated messages count once.
     """
     source = Source(str(path))
     with opened_bag(path, source) as reader:

@@ -96,9 +96,8 @@ def example(reader: AnyReader) -> str:
 def _fields(
     message: Any, lead: str = "", labels: Sequence[str] = (), label: str | None = None, is_named: bool = False
 ) -> Iterator[tuple[str, Any, str | None, bool]]:
-    """Yield numbers and texts of a message: name, value, label of the element, and whether the name has the label.
-
-    Elements of an array have numbers, and labels if a list of texts of that length is beside or above it.
+    """Yield numbers and texts of a message: name, value, label of the element, and whether the name has the label:
+    elements of an array have numbers, and labels if a list of texts of that length is beside or above it.
     """
     if isinstance(message, bool | int | float | str | np.generic):
         yield lead.rstrip("."), message, label, is_named

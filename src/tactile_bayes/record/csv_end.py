@@ -23,9 +23,8 @@ _NOTATION = re.compile(r"[+-]?[0-9]*(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P
 
 
 def without_cut_row(file: BinaryIO, header: Header, line: int) -> tuple[BinaryIO, str]:
-    """Return a file from its position after a line on, and a note on what is wrong, "" for nothing.
-
-    A last row without an end is left out if its last number stands out from those above, in notation or value.
+    """Return a file from its position after a line on, and a note on what is wrong, "" for nothing. A last row without
+    an end is left out if its last number stands out from those above, in notation or value.
     """
     begin, size = file.tell(), file.seek(0, io.SEEK_END)
     file.seek(max(begin, size - _TAIL))

@@ -169,9 +169,8 @@ def _with_usual_line_ends(file: BinaryIO) -> BinaryIO:
 
 
 def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], source: Source) -> dict[str, str]:
-    """Read the units of columns if the line below their names is a row of units; the file is then positioned after it.
-
-    There a measured column has a unit other than 1 and -, which may be readings, and no cell is a number.
+    """Read the units of columns if the line below their names is a row of units, after which the file then is: a
+    measured column has a unit other than 1 and -, which may be readings, and no cell is a number.
     """
     cells = cells_in(next(iter(lines_below(file)), ""), header.delimiter)
     texts = [_without_brackets(cell) for cell in cells]

@@ -44,7 +44,6 @@ class _WrongGuessError(Exception):
 
 def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
     """Read the columns of a file from its position, as int64, float64 or text, and the first line of each sample.
-
     Columns without a known kind are integers, else numbers (empty cells are NaN), else text.
     """
     begin = file.tell()
@@ -77,9 +76,8 @@ def _read_once(
 
 
 class _Values:
-    """The values of a column one after the other: words, each kept once, or numbers in one array.
-
-    Memory that is never written to costs nothing, and that of many small arrays would not be given back.
+    """The values of a column one after the other: words, each kept once, or numbers in one array: memory that is never
+    written to costs nothing, and that of many small arrays would not be given back.
     """
 
     def __init__(self, most: int) -> None:

@@ -69,9 +69,8 @@ class Origin:
 
 
 def column_entry(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, digits: int = 3) -> str:
-    """Return the source that reads a column of a record as sense · (its values) + added, rounded to digits.
-
-    "" if its origin does not have the unit of the record, as after a conversion by the rod.
+    """Return the source that reads a column of a record as sense · (its values) + added, rounded to digits; "" if its
+    origin does not have the unit of the record, as after a conversion by the rod.
     """
     name, unit = str(column.name), str(column.attrs.get("units", "1"))
     stored = column.encoding.get(ORIGIN) or column.attrs.get(ORIGIN)

@@ -19,9 +19,8 @@ from tactile_bayes.record.table import Source
 
 
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
-    """Refuse sweeps with several directions or two pivots, or with a drive angle in degrees or against the direction.
-
-    From three places of the base on, or if the drive angle does not move, the drive carries the base.
+    """Refuse sweeps with several directions or two pivots, or with a drive angle in degrees or against the direction;
+    from three places of the base on, or if the drive angle does not move, the drive carries the base.
     """
     direction, angle = values["direction"], values["drive_angle"]
     forward = direction == "forward"

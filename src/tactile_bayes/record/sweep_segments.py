@@ -38,11 +38,9 @@ def turning_points(angle: Floats, least: float) -> list[int]:
 
 
 def split_at_turns(table: Table, length: float = 1.0) -> Table:
-    """Add sweeps and directions to a table, from its drive angle, or from the motion of its base; see `FileFormat`.
-
-    If the base moves in more than half of the steps, the drive carries it. A sweep then ends where the base turns back
-    on the line along which it moves most, and it is forward if the middle of the unloaded rod, of this length [length],
-    moves to its left on average. In a record of both kinds each stretch is split in its own way.
+    """Add sweeps and directions to a table, from its drive angle, or from the motion of its base; see `FileFormat`. A
+    base that is carried turns back on the line along which it moves most; a sweep is forward if the middle of the
+    unloaded rod, of this length [length], moves to its left on average.
     """
     source = table.source
     table.refuse_empty()
@@ -97,9 +95,8 @@ def _finite(name: str, table: Table) -> Floats:
 
 
 def _stretches(angle: Floats, moved: Flags) -> list[tuple[slice, bool]]:
-    """Return stretches of samples in their order, each with whether the base is carried in it.
-
-    A base that rests while the drive turns is a pivot. `moved` is True where the base is not where it was before.
+    """Return stretches of samples in their order, each with whether the base is carried in it: a base that rests while
+    the drive turns is a pivot. `moved` is True where the base is not where it was before.
     """
     turns = np.zeros(angle.size, dtype=bool)
     for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):

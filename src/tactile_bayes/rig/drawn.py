@@ -41,9 +41,8 @@ class Described(Protocol):
 
 
 def unknown_of(rig: Described, pivots: int, uncertain: Collection[str] = ()) -> dict[str, Unknown]:
-    """Return what is said of every parameter of a rig that its calibration has not found.
-
-    `uncertain` are biases that the load cell draws by its own bias_uncertainty.
+    """Return what is said of every parameter of a rig that its calibration has not found; `uncertain` are biases that
+    the load cell draws by its own bias_uncertainty.
     """
     found = () if rig.calibration is None else tuple(rig.calibration.priors)
     said = of_pivots({name: value for name, value in rig.said.items() if name not in found}, pivots)

@@ -1,6 +1,5 @@
-"""The parameters of a rig: how far the rig on the table may be from what its data sheets state.
-
-One table: names, meanings, units, bounds, default distributions, and when a record cannot show them.
+"""The parameters of a rig: how far the rig on the table may be from what its data sheets state. One table: names,
+meanings, units, bounds, default distributions, and when a record cannot show them.
 """
 
 from __future__ import annotations
@@ -21,9 +20,8 @@ _CHANNELS = ("moment", "force_x", "force_y")
 
 
 class Parameter(NamedTuple):
-    """A parameter of a rig.
-
-    Units are products of powers: of the unit of moments, EI/L (of forces, EI/L², in zeros of forces), and of lengths.
+    """A parameter of a rig. Its unit is a product of powers: of the unit of moments, EI/L (of forces, EI/L², in zeros
+    of forces), and of lengths.
     """
 
     name: str

@@ -22,9 +22,8 @@ _FARTHEST = 30.0  # largest normal score, beyond which densities vanish anyway
 
 @dataclass(frozen=True, eq=False)
 class RigPrior:
-    """Joint prior of parameters of a rig: marginals, joined by a normal copula.
-
-    With normal and log-normal marginals it is a multivariate normal distribution of the parameters or their logarithms.
+    """Joint prior of parameters of a rig: marginals, joined by a normal copula. With normal and log-normal marginals it
+    is a multivariate normal distribution of the parameters or their logarithms.
     """
 
     # Marginals by name: normal, log-normal, or truncated normal where a parameter may be zero but not negative.
