@@ -8,7 +8,7 @@ from helpers.load_cells import CELL, GAIN, NORMAL, SHARED, UNKNOWN, WALK, cell, 
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.corruption import corrupted_angles
+from tactile_bayes.load_cell.measurement import corrupted_angles
 
 N, REPLICATES = 5, 10_000
 LOADS = np.array([[0.0, 0.0, 0.0], [0.1, -0.2, 0.3], [0.4, 0.1, 1.0], [0.5, -0.5, 2.0], [0.0, 0.0, 0.0]])

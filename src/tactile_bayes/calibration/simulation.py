@@ -15,7 +15,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.load_cell.corruption import corrupted_angles
+from tactile_bayes.load_cell.measurement import corrupted_angles
 from tactile_bayes.record import CHANNELS, bases_of
 
 _TRIALS = 200  # largest number of truths that are drawn until the simulated rig reaches one

@@ -13,9 +13,8 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.variations import Variation, quantity_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig.drawn import calibrated_at, unknown_of
 from tactile_bayes.rig.parameters import GROUPS, MEMORY, NEUTRAL, parameter_named
-from tactile_bayes.rig.rig import Rig
+from tactile_bayes.rig.rig import Rig, unknown_of
 from tactile_bayes.rig.rig_file import unit_of_unknown
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated, within_bounds
@@ -106,7 +105,7 @@ def drawn_deviations(
             found[name] = within_bounds(name, distribution, shares[f"unknown.{name}"])
     if spec.calibration is not None:
         joint = np.stack([shares[f"unknown.{name}"] for name in spec.calibration.priors], axis=1)
-        found |= calibrated_at(spec.calibration, joint)
+        found |= spec.calibration.at_shares(joint)
     return {f"unknown.{name}": numbers for name, numbers in found.items()}
 
 
@@ -129,7 +128,7 @@ def _stated(values: Mapping[str, Floats], count: int) -> Stated:
 
 
 def as_built(spec: Specification, values: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the numbers of rods, load cells and pivots, shape (n,), with the deviations from what data sheets state."""
+    """Return numbers of rods, load cells and pivots, shape (n,), with the deviations from what data sheets state."""
     built = dict(values)
     off = {name: values[f"unknown.{name}"] for name in spec.unknown}
     if off:

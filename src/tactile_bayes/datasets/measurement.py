@@ -14,7 +14,7 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed
-from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
+from tactile_bayes.load_cell.measurement import corrupted_angles, corrupted_loads
 from tactile_bayes.record import CHANNELS, loads_of, turned
 
 _OF_ENCODER = ("drive_angle_offset", "drive_angle_backlash", "drive_angle_noise")
