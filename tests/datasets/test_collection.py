@@ -17,7 +17,7 @@ from helpers.refusals import refused
 from tactile_bayes.datasets import manifest as manifest_module
 from tactile_bayes.datasets.collection import read_shard
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
-from tactile_bayes.datasets.netcdf import netcdf_of
+from tactile_bayes.datasets.shard import netcdf_of
 from tactile_bayes.errors import SpecificationError
 
 

@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.csv_end import without_cut_row
 from tactile_bayes.record.csv_header import (
     KINDS,
     Header,
@@ -23,7 +22,7 @@ from tactile_bayes.record.csv_header import (
     lines_below,
     read_header,
 )
-from tactile_bayes.record.csv_rows import Layout, read_rows
+from tactile_bayes.record.csv_rows import Layout, read_rows, without_cut_row
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of
 from tactile_bayes.record.parsing import number_with_comma
