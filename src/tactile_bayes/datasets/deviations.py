@@ -132,9 +132,9 @@ def as_built(spec: Specification, values: Mapping[str, Floats]) -> dict[str, Flo
     built = dict(values)
     off = {name: values[f"unknown.{name}"] for name in spec.unknown}
     if off:
-        one, zero = np.ones(len(next(iter(off.values())))), np.zeros(len(next(iter(off.values()))))
+        one = np.ones(len(next(iter(off.values()))))
         _build_rod(built, off, one)
-        _build_cell(built, off, one, zero)
+        _build_cell(built, off, one)
         for key, name in pivot_keys(spec).items():
             if name in off:
                 built[key] = built[key] + off[name]
@@ -151,10 +151,10 @@ def _build_rod(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats)
             built[f"rod.{name}"] = off[name]
 
 
-def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats, zero: Floats) -> None:
+def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats) -> None:
     for name, entry in _OF_CELL.items():
         if name in off:
-            built[f"load_cell.{entry}"] = built.get(f"load_cell.{entry}", zero) + off[name]
+            built[f"load_cell.{entry}"] = built.get(f"load_cell.{entry}", 0.0 * one) + off[name]
     for name in GROUPS["moment_curve"]:
         if name in off:
             built[f"load_cell.{name}"] = off[name]

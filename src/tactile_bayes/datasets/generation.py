@@ -310,7 +310,9 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
 def _of_sweeps(spec: Specification, tried: _Followed) -> dict[str, NDArray[Any]]:
     """Columns of every sweep, shape (n,)."""
     paths = tried.paths
-    phases = np.array([_touching(phases) for phases in phases_of(paths)], dtype=object)
+    # Of tip and tangential contact alone, whether they slide or stick.
+    words = ("-".join(phase for phase, _ in groupby(phases.upper().split("-"))) for phases in phases_of(paths))
+    phases = np.array(list(words), dtype=object)
     if spec.translations:
         found = {"direction": paths.sweep_frame.mirrored.astype(np.int8), "phases": phases}
     else:
@@ -326,11 +328,6 @@ def _of_sweeps(spec: Specification, tried: _Followed) -> dict[str, NDArray[Any]]
             paths.largest_curvature * paths.sweep_frame.standoff / paths.sweep_frame.length
         )
     return found
-
-
-def _touching(phases: str) -> str:
-    """Return phases as `phases_of` writes them, of tip and tangential contact alone, whether they slide or stick."""
-    return "-".join(phase for phase, _ in groupby(phases.upper().split("-")))
 
 
 def _of_samples(tried: _Followed, index: Index) -> dict[str, NDArray[Any]]:

@@ -206,7 +206,7 @@ def netcdf_of(dataset: xr.Dataset) -> list[memoryview]:
     for before, name in _frame(_Template(dataset)):
         found.append(before)
         if name is not None:
-            found.append(_bytes_of(dataset[name].values))
+            found.append(np.ascontiguousarray(dataset[name].values).reshape(-1).view(np.uint8).data)
     return found
 
 
@@ -259,7 +259,3 @@ def _frame(template: _Template) -> Sequence[tuple[memoryview, str | None]]:
 
 def _plain(attrs: Mapping[str, Any]) -> list[tuple[str, Any, Any]]:
     return [(name, np.asarray(value).dtype, np.asarray(value).tolist()) for name, value in attrs.items()]
-
-
-def _bytes_of(values: NDArray[np.generic]) -> memoryview:
-    return np.ascontiguousarray(values).reshape(-1).view(np.uint8).data

@@ -136,15 +136,12 @@ def _clipped(readings: Floats, floor: Floats) -> Floats:
 @lru_cache(maxsize=256)
 def _tested_ends(n: int) -> tuple[Index, Index]:
     """Return the numbers of samples at both ends of a sweep of n samples that are compared with the rest."""
-    ends = [k for k in _grid(n) if k < n]
+    # 0, and steps of half an octave: 1, 2, 3, 4, 6, 8, 12, ...
+    ends = [0, 1, *sorted(factor << k for k in range(n.bit_length()) for factor in (2, 3) if factor << k < n)]
+    ends = [k for k in ends if k < n]
     before, after = (k.ravel() for k in np.meshgrid(ends, ends))
     tested = (before + after >= FEWEST) & (before + after < n)
     return before[tested], after[tested]
-
-
-def _grid(n: int) -> list[int]:
-    """Return 0, and steps of half an octave: 1, 2, 3, 4, 6, 8, 12, ..."""
-    return [0, 1, *sorted(factor << k for k in range(n.bit_length()) for factor in (2, 3) if factor << k < n)]
 
 
 def _sums(values: Floats) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
@@ -34,8 +36,7 @@ class LoneSamples:
 
     def take(self, where: Index) -> LoneSamples:
         """Select samples."""
-        some = object.__new__(LoneSamples)
-        some._sheet, some._wanders = self._sheet, self._wanders
+        some = copy(self)
         some._readings, some._wandering = self._readings[where], self._wandering[where]
         return some
 

@@ -16,14 +16,11 @@ from tactile_bayes.load_cell.data_sheet import CERTAIN, DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.memory import remembered
 from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, loads_of, present_channels, validate
-from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
+from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE, SIGNED
 from tactile_bayes.record.times import times_of
 
 _PREFIX = "load_cell_"
-_TAKEN_OUT = tuple(
-    f"{_PREFIX}{name}"
-    for name in ("bias_h", "bias_f", "gain_", "lever_", "moment_curve_", "drive_angle_offset", "drive_angle_backlash")
-)
+_TAKEN_OUT = tuple(f"{_PREFIX}{name}" for name in SIGNED if name != "correlation_")
 
 
 def corrupted_loads(

@@ -48,7 +48,10 @@ def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
         if not wanted:
             what = f"no column is of one of its topics: write columns like drive_angle={example(reader)}; the bag has "
             raise source.error(what + (", ".join(sorted(names)) or "no topics"))
-        topics = messages_of(reader, wanted)
+        topics = {topic: Topic() for topic in wanted}
+        connections = [connection for connection in reader.connections if connection.topic in wanted]
+        for connection, received, raw in reader.messages(connections):
+            topics[connection.topic].add(reader.deserialize(raw, connection.msgtype), received, connection.id)
     asked = _asked(topics, columns, source)
     faults = []
     for by_header in (True, False):
@@ -190,7 +193,8 @@ def _further(topics: Mapping[str, Topic], asked: Iterable[_Column]) -> list[_Col
         _Column(topic, name, field, (), None)
         for topic, found in topics.items()
         for name, field in found.fields.items()
-        if f"{topic}.{name}" not in taken and not field.is_named and len(field.labels) == 1 and found.is_in_all(name)
+        if f"{topic}.{name}" not in taken and not field.is_named
+        if len(field.labels) == 1 and len(field.messages) == len(found.received)
     ]
 
 
@@ -265,10 +269,6 @@ class Topic:
             one.values.append(value)
             one.labels.add(label)
 
-    def is_in_all(self, name: str) -> bool:
-        """Return whether every message has a field."""
-        return len(self.fields[name].messages) == len(self.received)
-
 
 @contextmanager
 def opened_bag(path: Path, source: Source) -> Iterator[AnyReader]:
@@ -287,15 +287,6 @@ def opened_bag(path: Path, source: Source) -> Iterator[AnyReader]:
     except Exception as error:  # a damaged bag causes many kinds of errors
         what = " ".join(str(error).split()) or type(error).__name__
         raise source.error(f"the bag cannot be read, it is damaged, or no bag of ROS ({what})") from error
-
-
-def messages_of(reader: AnyReader, wanted: set[str]) -> dict[str, Topic]:
-    """Read the messages of some topics."""
-    found = {topic: Topic() for topic in wanted}
-    connections = [connection for connection in reader.connections if connection.topic in wanted]
-    for connection, received, raw in reader.messages(connections):
-        found[connection.topic].add(reader.deserialize(raw, connection.msgtype), received, connection.id)
-    return found
 
 
 def example(reader: AnyReader) -> str:

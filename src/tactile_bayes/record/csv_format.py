@@ -104,7 +104,10 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     text, note = without_cut_row(text, header, last)
     values, lines = read_rows(text, layout, Source(called))
     for name, place in unnamed.items():
-        _refuse_content(values.pop(name), place, lines, header.line, source)
+        texts = values.pop(name)
+        for sample in np.flatnonzero(texts != "").tolist():
+            if texts[sample].strip():
+                raise source.line_error(header.line, _without_name(place, lines[sample], str(texts[sample])))
     attrs = {
         name: {key: word for key, word in header.descriptions.get(name, {}).items() if key != "kind"} for name in values
     }
@@ -146,13 +149,6 @@ def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Map
         what += "but there are more cells in lines below: if the names are further down, put # before the lines above "
         what += "them; else write one cell per column, with a point in decimals"
         raise source.line_error(header.line, what)
-
-
-def _refuse_content(texts: NDArray[Any], place: int, lines: NDArray[np.int64], head: int, source: Source) -> None:
-    """Refuse a column without a name that is not empty."""
-    for sample in np.flatnonzero(texts != "").tolist():
-        if texts[sample].strip():
-            raise source.line_error(head, _without_name(place, lines[sample], str(texts[sample])))
 
 
 def _without_name(place: int, line: int, text: str) -> str:

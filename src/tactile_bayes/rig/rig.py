@@ -21,10 +21,11 @@ from tactile_bayes.record import rod_of, validate
 from tactile_bayes.rig.corrected import measured_by
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, STANDARD, members
-from tactile_bayes.rig.rig_file import named_in_errors, read_tables, stated_in, tables_of, text_of, write_file
+from tactile_bayes.rig.rig_file import file_of, named_in_errors, read_tables, stated_in, tables_of, text_of
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated, rod_with, within_bounds
 from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded, of_modes, of_pivots
+from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_toml
 
 _SHAPE = ("rest_curvature", "taper", "taper_error", "stem", "length", *GROUPS["rest_shape"])
@@ -341,7 +342,9 @@ class Rig:
         ParameterError
             If a distribution is none of SciPy's, which text cannot state.
         """
-        write_file(self.tables, check_path("path", path, "give a file rig.toml"))
+        text = file_of(self.tables)
+        with write_atomically(check_path("path", path, "give a file rig.toml")) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def rig_of(rig: Rig | None) -> Rig:
