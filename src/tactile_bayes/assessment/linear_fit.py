@@ -9,7 +9,7 @@ import numpy as np
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.load_cell.covariance import wandering_deviation
+from tactile_bayes.load_cell.lone_samples import wandering_deviation
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.planning.error_covariance import NoiseWhitening, whitening
 from tactile_bayes.planning.record_information import prior_precision, scaled_cell

@@ -63,7 +63,8 @@ def deviations_of_table(
         del every["backlash"]
     if gauge := [name for name in GROUPS["gauge"] if name in every]:
         raise SpecificationError(f"unknown.{gauge[0]} is of the record of a gauge: leave it out of a data set")
-    kept = {name: variation for name, variation in every.items() if not _is_as_stated(name, variation)}
+    neutral = {name: getattr(parameter_named(name), "neutral", None) for name in every}
+    kept = {name: of for name, of in every.items() if of.kind != "constant" or of.numbers[0] != neutral[name]}
     return {**kept, **dict.fromkeys(found, Variation("calibrated"))}
 
 
@@ -77,11 +78,6 @@ def _checked(given: Mapping[str, Variation]) -> dict[str, Any]:
         name: v.numbers[0] if v.kind == "constant" else DEFAULT if v.kind in (*_DISCRETE, DEFAULT) else v.frozen
         for name, v in given.items()
     }
-
-
-def _is_as_stated(name: str, variation: Variation) -> bool:
-    parameter = parameter_named(name)
-    return variation.kind == "constant" and parameter is not None and variation.numbers[0] == parameter.neutral
 
 
 def is_around_the_stated(key: str, variation: Variation) -> bool:

@@ -9,8 +9,8 @@ from scipy.linalg import solve_triangular
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.discrepancy import Discrepancy
+from tactile_bayes.load_cell.lone_samples import wandering_deviation
 
 
 class NoiseWhitening(NamedTuple):

@@ -11,7 +11,7 @@ import xarray as xr
 
 from tactile_bayes.diagnostics.inspection.corrections import Correction, as_it_is, corrections_for
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.covariance import wandering_deviation
+from tactile_bayes.load_cell.lone_samples import wandering_deviation
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, loads_of
 from tactile_bayes.rig.corrected import Corrected
