@@ -88,9 +88,7 @@ def is_around_the_stated(key: str, variation: Variation) -> bool:
 def drawn_deviations(
     spec: Specification, values: Mapping[str, Floats], shares: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """Return the deviations that are drawn around what data sheets state, shape (n,) each, by the keys of their
-    distributions.
-    """
+    """Return deviations drawn around what data sheets state, shape (n,), by the keys of their distributions."""
     drawn = {name: v for name, v in spec.unknown.items() if v.kind not in _DISCRETE}
     if not drawn:
         return {}

@@ -138,8 +138,7 @@ def _state_pivots(spec: Specification, records: Records) -> None:
 
 
 def directions_of(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
-    """Return the directions of the sweeps, 0 forward and 1 backward, shape (sweeps,), or (n, sweeps) of a base that is
-    carried."""
+    """Return directions, 0 forward and 1 backward, shape (sweeps,), or (n, sweeps) where the base is carried."""
     if spec.translations:
         return sweep["direction"]
     return np.array([direction == "backward" for _, direction in spec.sweeps], dtype=np.int8)

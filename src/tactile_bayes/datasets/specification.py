@@ -212,9 +212,7 @@ class Specification:
 
 
 def meaning(text: str) -> dict[str, Any]:
-    """Return the meaning of the text of a specification.
-
-    It does not depend on comments, layout, the notation of numbers (1 or 1.0), or explicit default values."""
+    """Return the meaning of a specification's text, without comments, layout, notation and written defaults."""
     said = without(DEFAULTS, read_toml(text))
     said["contours"] = [
         without({"weight": 1.0, **left_out(FAMILIES[group["family"]])}, group) for group in said["contours"]

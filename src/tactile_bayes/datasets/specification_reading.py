@@ -225,8 +225,7 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
 
 
 def _refuse_no_contour(family: ContourFamily, distributions: Mapping[str, Variation], key: str) -> None:
-    """Refuse parameters that are impossible for any values of the others, by the ends of the distributions; draws from
-    unbounded distributions are tested later."""
+    """Refuse parameters that are impossible whatever the others; unbounded distributions are tested later."""
     possible = {name: np.full(1, 2.0 if name.endswith("n") else 1.0) for name in family.parameters}
     for name, distribution in distributions.items():
         numbers = distribution.numbers

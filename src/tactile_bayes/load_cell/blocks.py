@@ -38,9 +38,7 @@ class Blocks(NamedTuple):
         return cls(readings, freedom, scatter / np.square(rod.load_units))
 
     def log_density_within(self, deviation: Floats, present: Flags, *, pointwise: bool) -> Floats:
-        """Return the log-density of the readings of blocks, given their means and slopes. Shapes: deviation (..., 1 or
-        samples, 3), present (3,).
-        """
+        """Return the log-density of readings given means and slopes; deviation (..., 1 or samples, 3), present (3,)."""
         deviation = deviation[..., present]
         scatter, freedom = self.scatter[:, present], self.freedom[:, None]
         if not pointwise and deviation.shape[-2] == 1:

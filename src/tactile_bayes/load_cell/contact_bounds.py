@@ -37,9 +37,7 @@ class ContactBounds:
 
 
 def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> ContactBounds:
-    """Find contact, its onset and its snap-off in one sweep, by the method of `zero_load`. Shapes: readings (samples,
-    channels), floor (channels,).
-    """
+    """Find contact and its bounds in the readings of one sweep, (samples, channels), by the method of `zero_load`."""
     n = len(readings)
     readings = readings - readings[0]
     p_value, before, after = _contact(readings, floor)
@@ -122,9 +120,7 @@ def _course(readings: Floats, floor: Floats) -> float:
 
 
 def _clipped(readings: Floats, floor: Floats) -> Floats:
-    """Clip readings that exceed both neighbours, at three deviations from the median or at the neighbour, unless half
-    of the readings are equal.
-    """
+    """Clip readings beyond both neighbours at three deviations from the median, unless half of them are equal."""
     off = readings - np.median(readings, axis=0)
     deviation = DEVIATION_OVER_MEDIAN * np.median(np.abs(off), axis=0)
     limit = np.where(deviation > 0.0, _CLIP * np.sqrt(deviation**2 + floor), np.inf)

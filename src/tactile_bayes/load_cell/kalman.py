@@ -69,9 +69,7 @@ def _sum_before(values: Floats) -> Floats:
 def _run(
     smooths: bool, residual: Floats, noise: Floats, zero: Zero, discrepancy: Discrepancy | None = None
 ) -> tuple[Floats, Floats]:
-    """Filter, or smooth as well, with one axis for the batch, and room for results and the states' mean, covariance,
-    a vector, and gains.
-    """
+    """Filter, or smooth as well, with one axis for the batch."""
     noise = np.atleast_2d(noise)
     constant = zero.bias if zero.decay == 1.0 else 0.0
     variances = zero.initial + constant, zero.step, zero.bias - constant

@@ -34,9 +34,7 @@ def log_likelihood(
     discrepancy: Discrepancy | None = None,
     left_out: bool = False,
 ) -> Floats:
-    """Log-density of readings; see `LoadCell.log_likelihood`. Dependent samples are conditional on those before, or on
-    all others if `left_out`.
-    """
+    """Log-density of readings, of dependent ones given those before, or all others; see `LoadCell`."""
     check_optional("discrepancy", discrepancy, Discrepancy)
     readings, loads, scale = _checked(measured, predicted, noise_scale)
     present = _present(sheet, readings)

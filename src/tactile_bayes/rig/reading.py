@@ -181,9 +181,7 @@ def _warn(record: xr.Dataset, where: str = "") -> None:
 
 
 def record_in(table: Table, rig: Rig) -> xr.Dataset:
-    """Return the record in a table as its rig wrote it. Its encoding has "notes", what was assumed or left out, and
-    "remarks", commented lines without a meaning.
-    """
+    """Return the record in a table as its rig wrote it, with "notes" and "remarks" of the file in its encoding."""
     columns, rod, cell = rig.format.columns, rig.rod, rig.load_cell
     shape = rod if rod is not None and rod.is_dimensionless and rod != Rod() else None
     if shape is not None:

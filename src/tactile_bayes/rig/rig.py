@@ -354,9 +354,7 @@ def rig_of(rig: Rig | None) -> Rig:
 
 
 def unknown_of(rig: Rig, pivots: int, uncertain: Collection[str] = ()) -> dict[str, Unknown]:
-    """Return what is said of every parameter of a rig that its calibration has not found; `uncertain` are biases that
-    the load cell draws by its own bias_uncertainty.
-    """
+    """Return what is said of all parameters but calibrated ones, and biases that the load cell itself draws."""
     found = () if rig.calibration is None else tuple(rig.calibration.priors)
     said = of_pivots({name: value for name, value in rig.said.items() if name not in found}, pivots)
     said = of_modes(said, rig.rod or Rod())
