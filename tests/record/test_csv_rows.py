@@ -85,20 +85,6 @@ def test_a_cell_among_usual_ones_is_what_it_is_alone(tmp_path, cell):
             assert repr(read_csv(path, {}).columns[name][0].tolist()[1]) == repr(parsed)
 
 
-@pytest.mark.slow
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(numbers=st.lists(st.floats(allow_nan=False, width=64) | st.decimals(allow_nan=False), min_size=20, max_size=40))
-@pytest.mark.parametrize("decimal", [".", ","])
-def test_digits_become_the_nearest_double(tmp_path, decimal, numbers):
-    texts = ["0.5", *map(str, numbers)]
-    path = tmp_path / "record.csv"
-    path.write_text("sweep;force_x\n" + "".join(f"0;{text.replace('.', decimal)}\n" for text in texts))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(csv_rows, "_ROWS", 3)
-        values = read_csv(path, {}).columns["force_x"][0]
-    assert values.tobytes() == np.array([float(text) for text in texts]).tobytes()
-
-
 READING = """
 import sys
 from helpers.memory import own_peak
