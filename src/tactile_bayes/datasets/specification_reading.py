@@ -12,14 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from tactile_bayes.checks import (
-    check_choice,
-    check_kind,
-    check_number,
-    check_path,
-    check_whole_number,
-    refused,
-)
+from tactile_bayes.checks import check_choice, check_kind, check_number, check_path, check_whole_number, refused
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.datasets.deviations import deviations_of_table

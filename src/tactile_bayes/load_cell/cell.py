@@ -298,12 +298,7 @@ class LoadCell(DataSheet):
             )
 
     def simulate(
-        self,
-        loads: ArrayLike,
-        *,
-        rng: Rng,
-        noise_scale: ArrayLike = 1.0,
-        discrepancy: Discrepancy | None = None,
+        self, loads: ArrayLike, *, rng: Rng, noise_scale: ArrayLike = 1.0, discrepancy: Discrepancy | None = None
     ) -> Floats:
         """Simulate the readings of loads, as arrays.
 

@@ -219,12 +219,7 @@ def _dependent(
 
 
 def _wandering(
-    sheet: DataSheet,
-    residual: Floats,
-    noise: Floats,
-    present: Index,
-    discrepancy: Discrepancy | None,
-    left_out: bool,
+    sheet: DataSheet, residual: Floats, noise: Floats, present: Index, discrepancy: Discrepancy | None, left_out: bool
 ) -> Floats:
     """Log-density of each sample given others, for independent noise of the channels."""
     bias = np.array(sheet.bias_uncertainty)[present] ** 2

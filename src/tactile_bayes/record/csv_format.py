@@ -13,15 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.csv_header import (
-    KINDS,
-    Header,
-    cells_in,
-    column_line,
-    header_line,
-    lines_below,
-    read_header,
-)
+from tactile_bayes.record.csv_header import KINDS, Header, cells_in, column_line, header_line, lines_below, read_header
 from tactile_bayes.record.csv_rows import Layout, read_rows, without_cut_row
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of

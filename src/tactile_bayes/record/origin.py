@@ -15,14 +15,7 @@ import xarray as xr
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.quantity import (
-    OTHER_UNITS,
-    accepted_units,
-    converted,
-    same_quantity,
-    unit_of,
-    units_disagree,
-)
+from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, converted, same_quantity, unit_of, units_disagree
 from tactile_bayes.record.schema import DIRECTIONS, MEASURED, Column, Kind, column_of
 from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
