@@ -198,6 +198,9 @@ def _described(spec: Specification, name: str) -> dict[str, Any]:
     return {"units": column.unit_in(spec.units), "long_name": column.long_name_in(spec.frame)}
 
 
+# ---- NetCDF of plain numbers: the structure is made once for all files that differ in the numbers only
+
+
 def netcdf_of(dataset: xr.Dataset) -> list[memoryview]:
     """Return a dataset of numbers as NetCDF 4: HDF5 with dimension scales, as the specification of the format defines,
     made in memory, since HDF5 aborts the process if it cannot write. Equal datasets give equal bytes.

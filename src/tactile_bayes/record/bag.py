@@ -237,6 +237,9 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
 
+# ---- messages
+
+
 @dataclass(frozen=True)
 class Field:
     """Values of a field in the order of reception."""

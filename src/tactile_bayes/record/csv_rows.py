@@ -228,6 +228,9 @@ def _refuse_cell(
     raise source.cell_error(np.array(samples), name, f"{texts[sample]!r}{look_alikes(texts[sample])} {what}")
 
 
+# ---- the end of a file: its last line may be cut within its last number
+
+
 def without_cut_row(file: BinaryIO, header: Header, line: int) -> tuple[BinaryIO, str]:
     """Return a file from its position after a line on, and a note on what is wrong, "" for nothing. A last row without
     an end is left out if its last number stands out from those above, in notation or value.

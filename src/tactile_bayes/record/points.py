@@ -152,6 +152,9 @@ def _point(row: Sequence[str], places: Sequence[int], delimiter: str) -> list[fl
     return numbers if len(numbers) == len(cells) else None
 
 
+# ---- drawings in DXF, by the package ezdxf
+
+
 def curves_in(path: Path) -> tuple[list[Floats], float]:
     """Return the curves of a drawing as polylines, shape (n, 2) each, and its unit [m], 0 for none."""
     try:

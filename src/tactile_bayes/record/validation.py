@@ -137,6 +137,9 @@ def _refuse_gaps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
             raise source.cell_error(bad, name, f"the value {what}: give a finite number, remove the row{way_out}")
 
 
+# ---- records made of columns and of tables
+
+
 def table_of_columns(columns: Mapping[str, Any] | pd.DataFrame, attrs: Mapping[str, Any] | None) -> Table:
     """Return a table of columns by name, in which a single value stands for a whole column."""
     check_mapping("attrs", attrs, "give strings and numbers by name")

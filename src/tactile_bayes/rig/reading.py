@@ -211,6 +211,9 @@ def record_in(table: Table, rig: Rig) -> xr.Dataset:
     return record
 
 
+# ---- the rows of a table that belong to a record
+
+
 def rows_where(table: Table, where: str) -> Table:
     """Return the rows of a table that meet each of some conditions, as in `FileFormat`."""
     if not where:
