@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -83,16 +84,10 @@ def _memory(what: str, meaning: str, unit: str, width: float) -> Iterator[Parame
         yield Parameter(f"{prefix}{what}", meaning.format(of), unit, "half_normal", width, None, 0.0)
 
 
+_not_negative = partial(Parameter, low=0.0)
 _ROWS = (
-    Parameter(
-        "rigidity_scale",
-        "flexural rigidity over the stated one",
-        "1",
-        "log_normal",
-        0.05,
-        1.0,
-        0.0,
-        hidden=_BESIDE_GAINS,
+    _not_negative(
+        "rigidity_scale", "flexural rigidity over the stated one", "1", "log_normal", 0.05, 1.0, hidden=_BESIDE_GAINS
     ),
     Parameter(
         "drive_angle_offset", "reading of the encoder less the angle", "rad", "normal", _DEGREE, 0.0, -np.pi, np.pi
@@ -127,17 +122,11 @@ _ROWS = (
     *_memory("lag", "lag of first order of {}, in readings", "1", 1.0),
     *_memory("lag_seconds", "lag of first order of {}, where the record has times", "s", 0.2),
     *_memory("play", "hysteresis of {}: half the loop's width over the largest load", "1", 0.01),
-    Parameter(
-        "suspension_compliance", "turn of the pivot per holding moment", "rad/(N m)", "half_normal", 0.05, 0.0, 0.0
+    _not_negative(
+        "suspension_compliance", "turn of the pivot per holding moment", "rad/(N m)", "half_normal", 0.05, 0.0
     ),
-    Parameter(
-        "contact_compliance",
-        "way of the object along its normal per normal force",
-        "m/N",
-        "half_normal",
-        0.003,
-        0.0,
-        0.0,
+    _not_negative(
+        "contact_compliance", "way of the object along its normal per normal force", "m/N", "half_normal", 0.003, 0.0
     ),
     Parameter("rest_curvature", "mean curvature of the unloaded rod", "1/m", "normal", 0.05, None),
     *(
@@ -148,41 +137,32 @@ _ROWS = (
         "taper_error", "error of the measured taper, in its standard deviations", "1", "normal", 1.0, hidden=_UNMEASURED
     ),
     Parameter("taper", "part by which the diameter falls to the tip", "1", "normal", 0.05, None, 0.0, STEEPEST_TAPER),
-    Parameter(
-        "stem", "rigid, straight piece between pivot and rod", "m", "normal", 0.02, None, 0.0, hidden=_BESIDE_LEVER
+    _not_negative(
+        "stem", "rigid, straight piece between pivot and rod", "m", "normal", 0.02, None, hidden=_BESIDE_LEVER
     ),
     Parameter("length", "length of the rod", "m", "normal", 0.01, None, 0.0),
     *(
         Parameter(f"gauge_{a}", f"{a} of the gauge less the stated one", "m", "normal", 0.01, hidden=_NO_GAUGE)
         for a in "xy"
     ),
-    Parameter(
+    _not_negative(
         "discrepancy_scale",
         "smooth deviation of readings in contact over the largest load of the sweep",
         "1",
         "log_normal",
         1.0,
         0.005,
-        0.0,
     ),
-    Parameter(
+    _not_negative(
         "discrepancy_length",
         "drive angle, or travel in rod lengths, over which it changes",
         "rad",
         "log_normal",
         0.5,
         0.3,
-        0.0,
     ),
-    Parameter(
-        "noise_scale",
-        "noise over the one that the load cell states",
-        "1",
-        "log_normal",
-        0.5,
-        1.0,
-        0.0,
-        hidden=_NO_NOISE,
+    _not_negative(
+        "noise_scale", "noise over the one that the load cell states", "1", "log_normal", 0.5, 1.0, hidden=_NO_NOISE
     ),
     *(
         Parameter(f"{of}_noise", f"standard deviation of {what}", unit, "log_uniform", 1e-6, None, 0.0, hidden=_NOISE)
