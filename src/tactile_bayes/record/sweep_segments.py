@@ -49,25 +49,19 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
     if "drive_angle" in table.columns:  # else refused later, with the others that are missing
         angle = _finite("drive_angle", table)
         at_origin = np.zeros(angle.size)
-        base = [_finite(name, table) if name in table.columns else at_origin for name in ("base_x", "base_y")]
-        sweeps = _sweeps_in(angle, np.stack(base, axis=1), length, source)
+        xy = [_finite(name, table) if name in table.columns else at_origin for name in ("base_x", "base_y")]
+        base, sweeps = np.stack(xy, axis=1), []
+        moved = np.append(False, np.any(base[1:] != base[:-1], axis=1))
+        _refuse_wrapped(angle, moved, source)
+        for stretch, is_carried in _stretches(angle, moved):
+            if is_carried:
+                sweeps += _carried_sweeps(stretch, angle, base, length, source)
+            else:
+                sweeps += _turned_sweeps(stretch, angle, moved, source)
     sizes = [end - begin for begin, end, _ in sweeps]
     sweep = np.repeat(np.arange(len(sweeps)), sizes)
     direction = np.where(np.repeat([is_forward for *_, is_forward in sweeps], sizes), "forward", "backward")
     return replace(table, columns={**table.columns, "sweep": (sweep, {}), "direction": (direction, {})})
-
-
-def _sweeps_in(angle: Floats, base: Floats, length: float, source: Source) -> list[tuple[int, int, bool]]:
-    """Return begin and end of each sweep, and whether it is forward."""
-    moved = np.append(False, np.any(base[1:] != base[:-1], axis=1))
-    _refuse_wrapped(angle, moved, source)
-    sweeps: list[tuple[int, int, bool]] = []
-    for stretch, is_carried in _stretches(angle, moved):
-        if is_carried:
-            sweeps += _carried_sweeps(stretch, angle, base, length, source)
-        else:
-            sweeps += _turned_sweeps(stretch, angle, moved, source)
-    return sweeps
 
 
 def each_row(table: Table) -> Table:
