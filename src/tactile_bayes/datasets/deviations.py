@@ -30,6 +30,11 @@ _OF_CELL = {
     "drive_angle_offset": "drive_angle_offset",
     "backlash": "drive_angle_backlash",
 }
+# Parameters that replace numbers of the data sheets, by the keys of these.
+_IN_PLACE = {
+    **{f"rod.{name}": name for name in ("length", "rest_curvature", "taper", "stem")},
+    **{f"load_cell.{name}": name for name in GROUPS["moment_curve"]},
+}
 
 
 def deviations_of_table(
@@ -125,33 +130,17 @@ def as_built(spec: Specification, values: Mapping[str, Floats]) -> dict[str, Flo
     """Return numbers of rods, load cells and pivots, shape (n,), with the deviations from what data sheets state."""
     built = dict(values)
     off = {name: values[f"unknown.{name}"] for name in spec.unknown}
-    if off:
-        one = np.ones(len(next(iter(off.values()))))
-        _build_rod(built, off, one)
-        _build_cell(built, off, one)
-        for key, name in pivot_keys(spec).items():
-            if name in off:
-                built[key] = built[key] + off[name]
-    return built
-
-
-def _build_rod(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats) -> None:
+    if not off:
+        return built
+    one = np.ones(len(next(iter(off.values()))))
     if "rigidity_scale" in off:
         built["rod.flexural_rigidity"] = off["rigidity_scale"] * built.get("rod.flexural_rigidity", one)
     if "length" in off and "rod.rest_curvature" in built:  # it keeps its turn from base to tip
         built["rod.rest_curvature"] = built["rod.rest_curvature"] * built.get("rod.length", one) / off["length"]
-    for name in ("length", "rest_curvature", "taper", "stem"):
-        if name in off:
-            built[f"rod.{name}"] = off[name]
-
-
-def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats) -> None:
+    built |= {key: off[name] for key, name in _IN_PLACE.items() if name in off}
     for name, entry in _OF_CELL.items():
         if name in off:
             built[f"load_cell.{entry}"] = built.get(f"load_cell.{entry}", 0.0 * one) + off[name]
-    for name in GROUPS["moment_curve"]:
-        if name in off:
-            built[f"load_cell.{name}"] = off[name]
     for what, names in MEMORY.items():
         keys = [f"load_cell.{what}_{channel}" for channel in CHANNELS]
         built |= dict.fromkeys(keys, off[what]) if what in off else {}
@@ -161,6 +150,8 @@ def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats
         key = f"load_cell.gain_{to}_{of}"
         if gains[of] in off and (to == of or key in built):
             built[key] = off[gains[of]] * built.get(key, one)
+    built |= {key: built[key] + off[name] for key, name in pivot_keys(spec).items() if name in off}
+    return built
 
 
 def pivot_keys(spec: Specification) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -168,10 +168,18 @@ def _times(topics: Mapping[str, Topic], by_header: bool) -> dict[str, Index]:
 
 def _table(topics: Mapping[str, Topic], times: Mapping[str, Index], asked: list[_Column], source: Source) -> Table:
     """Return the table of the columns that were asked for, and of all other fields of their topics."""
-    main = asked[0]
+    main, taken = asked[0], {column.name for column in asked}
+    # All other fields that every message has, elements by their numbers if these stand for the same.
+    further = [
+        _Column(topic, name, field, (), None)
+        for topic, found in topics.items()
+        for name, field in found.fields.items()
+        if f"{topic}.{name}" not in taken and not field.is_named
+        if len(field.labels) == 1 and len(field.messages) == len(found.received)
+    ]
     at, _ = main.series(times[main.topic])
     cells, known = {}, np.ones(at.size, dtype=bool)
-    for column in (*asked, *_further(topics, asked)):
+    for column in (*asked, *further):
         own, values = column.series(times[column.topic])
         if column.topic == main.topic and np.array_equal(own, at):
             cells[column.name] = values
@@ -184,18 +192,6 @@ def _table(topics: Mapping[str, Topic], times: Mapping[str, Index], asked: list[
     table: dict[str, Cells] = {name: (values[known], {}) for name, values in cells.items()}
     table["time"] = (at[known] - at[known][:1]) / 1e9, {"units": "s"}
     return Table(table, {}, Source(source.name, names=list(table)))
-
-
-def _further(topics: Mapping[str, Topic], asked: Iterable[_Column]) -> list[_Column]:
-    """Return all other fields that every message has, elements by their numbers if these stand for the same."""
-    taken = {column.name for column in asked}
-    return [
-        _Column(topic, name, field, (), None)
-        for topic, found in topics.items()
-        for name, field in found.fields.items()
-        if f"{topic}.{name}" not in taken and not field.is_named
-        if len(field.labels) == 1 and len(field.messages) == len(found.received)
-    ]
 
 
 def _usual(times: Index) -> Flags:
