@@ -12,12 +12,10 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from helpers.data_sets import PLAIN, RICH, SHAPES, changed
+from helpers.data_sets import PLAIN
 from helpers.refusals import refused
 from tactile_bayes.datasets import manifest as manifest_module
-from tactile_bayes.datasets.collection import read_shard
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
-from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.errors import SpecificationError
 
 
@@ -218,18 +216,3 @@ def test_variables_in_other_files_are_refused_though_the_checksum_is_right(folde
     for name, words in (("force_x", "another file"), ("force_y", "link")):
         with refused(SpecificationError, path.name, words):
             data[name].load()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("spec", [PLAIN, RICH, SHAPES])
-def test_files_are_as_xarray_would_write_them(spec, tmp_path):
-    """Up to the order in which HDF5 lists them: read back, both are the same, in every name, number and attribute."""
-    tb.datasets.generate(changed(spec, records=3, shard_records=3), tmp_path, workers=1)
-    (shard,) = read_manifest(tmp_path).shards
-    mine = read_shard(tmp_path, shard)
-    encoding = {name: {"_FillValue": None} for name in mine.variables}
-    mine.to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf", encoding=encoding)
-    theirs = xr.load_dataset(tmp_path / "theirs.nc", engine="h5netcdf", decode_times=False, decode_timedelta=False)
-    xr.testing.assert_identical(mine, theirs)
-    assert {n: v.dtype for n, v in mine.variables.items()} == {n: v.dtype for n, v in theirs.variables.items()}
-    assert netcdf_of(mine) == netcdf_of(mine.copy(deep=True))

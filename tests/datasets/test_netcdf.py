@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tactile_bayes.datasets.netcdf import netcdf_of
+from tactile_bayes.datasets.shard import netcdf_of
 
 
 def numbers(seed, **attrs):

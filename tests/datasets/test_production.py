@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 import random
 import signal
 import subprocess
@@ -147,30 +146,6 @@ def test_files_of_unknown_origin_are_left_alone(tmp_path, name):
     with refused(SpecificationError, name or out):
         generate(PLAIN, out)
     assert (out / name).read_text() == "mine"
-
-
-FULL = f"""
-import resource, signal
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
-{GENERATE}
-"""
-
-
-@pytest.mark.slow
-@on_linux
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_disk_that_takes_no_more_is_told_and_leaves_no_half_files(tmp_path, workers):
-    """Files can grow to 40 kB only: that stops a shard in its middle, as a full disk would."""
-    (tmp_path / "spec.toml").write_text(toml_of(PLAIN), encoding="utf-8")
-    out = tmp_path / "out"
-    command = [sys.executable, "-c", FULL, str(tmp_path / "spec.toml"), str(out), str(workers)]
-    done = subprocess.run(command, cwd=TESTS, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 1
-    assert f"OSError: [Errno 27] File too large: '{out}{os.sep}shard-00000" in done.stderr
-    assert [path.name for path in out.iterdir()] == ["manifest.json"]
-    generate(PLAIN, out, workers=1)
-    verify(out)
 
 
 def test_another_data_set_is_left_alone(folder):

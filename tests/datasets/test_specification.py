@@ -34,13 +34,6 @@ def test_a_mapping_and_its_toml_are_one(spec, tmp_path):
     assert read_specification(str(path)).sha256 == read_specification(spec).sha256
 
 
-def test_comments_layout_and_kinds_of_number_do_not_count(tmp_path):
-    lines = toml_of(PLAIN).replace("0.05", "5e-2").replace("[0, ", "[0.0,    ").splitlines()
-    path = tmp_path / "spec.toml"
-    path.write_text("\n\n".join(f"{line}  # what nobody reads" for line in reversed(lines)))
-    assert read_specification(path).sha256 == read_specification(PLAIN).sha256
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -74,14 +67,10 @@ def test_numpy_numbers_and_tuples_are_taken():
 
 REFUSED = [
     ({"record": 5}, ["there is no key 'record'", "'records'"]),
-    ({"no such": 5}, ["there is no key 'no such'"]),
     ({"records": None}, ["records is missing"]),
     ({"seed": None}, ["seed is missing"]),
     ({"records": 0}, ["records is 0"]),
-    ({"records": 24.0}, ["records is 24.0"]),
     ({"records": 8_000_001}, ["records is 8000001", "8000000"]),
-    ({"seed": -1}, ["seed is -1"]),
-    ({"shard_records": 0}, ["shard_records is 0"]),
     ({"name": 3}, ["name is 3"]),
     ({"precision": "half"}, ["precision is 'half'"]),
     ({"each_contour": "yes"}, ["each_contour is 'yes'"]),
@@ -99,41 +88,30 @@ REFUSED = [
     ({"contours": [{"family": "parabola", "a": 1.0}]}, ["contours[0] is a parabola and has no q"]),
     (contour(r=1.0), ["there is no key 'contours[0].r'"]),
     (contour(weight=0), ["contours[0].weight is 0.0"]),
-    (contour(weight=float("inf")), ["contours[0].weight is inf"]),
     ({**contour(weight=1), "each_contour": True}, ["contours[0].weight is 1.0", "each_contour"]),
     (contour(q="deep"), ["contours[0].q is 'deep'"]),
     (contour(q=10**400), ["contours[0].q", 10**400]),
     (contour(q={"uniform": [0.3, 0.5], "normal": [0, 1]}), ["contours[0].q is {"]),
     (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma'"]),
-    (contour(q={"uniform": 0.3}), ["contours[0].q.uniform is 0.3"]),
-    (contour(q={"choice": []}), ["contours[0].q.choice is []"]),
     (contour(q={"each": [1.0, "2"]}), ["contours[0].q.each is [1.0, '2']"]),
     (contour(q={"uniform": [0.3]}), ["contours[0].q.uniform is [0.3]", "2"]),
     (contour(q={"uniform": [0.5, 0.3]}), ["contours[0].q.uniform is [0.5, 0.3]"]),
     ({"rod": 3}, ["rod is 3"]),
     ({"rod": {"length": 0.1}}, ["rod needs length [m] and flexural_rigidity [N m²]"]),
-    ({"rod": {"length": 0.1, "stiffness": 1.0}}, ["there is no key 'rod.stiffness'"]),
     ({"rod": {"length": {"normal": [0.1, 0.01]}, "flexural_rigidity": 1.0}}, ["rod.length may be negative"]),
     ({"rod": {"rest_curvature": 4.0}}, ["rest_curvature", "half circle"]),
     ({"rod": {"taper": 1.0}}, ["rod.taper is 1", "0.95"]),
-    ({"rod": {"taper": {"uniform": [-0.1, 0.5]}}}, ["rod.taper may be negative"]),
     ({"rod": {"taper": {"log_normal": [0.5, 0.1]}}}, ["rod.taper may be unbounded"]),
     ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, ["rod.flexural_rigidity is 0"]),
-    ({"scan__speed": 1.0}, ["there is no key 'scan.speed'"]),
     ({"scan__bases": []}, ["scan.bases is []"]),
     ({"scan__bases": [[0.0, "x"]]}, ["scan.bases[0][1] is 'x'"]),
     ({"scan__directions": "forward"}, ["scan.directions is 'forward'"]),
-    ({"scan__samples": 1}, ["scan.samples is 1"]),
     ({"scan__margin": -0.1}, ["scan.margin is -0.1"]),
     ({"scan__from_degrees": 10}, ["scan.to_degrees is missing"]),
     ({"scan__seed": 10}, ["there is no key 'scan.seed'", "top"]),
     ({"scan": {"from_degrees": 10, "to_degrees": 90, "margin": 0.1}}, ["from_degrees and to_degrees, and a margin"]),
     ({"scan": {"from_degrees": 90, "to_degrees": 10}}, ["scan.from_degrees is 90", "to_degrees, 10"]),
-    ({"scan": {"from_degrees": -400, "to_degrees": 10}}, ["scan.from_degrees is -400"]),
-    ({"scan__friction": 0.2}, ["there is no key 'scan.friction'", "[unknown]"]),
     ({"unknown": {"friction": 2.0}}, ["friction", "2.0", "0.8423"]),
-    ({"load_cell__xyz": 1.0}, ["there is no key 'load_cell.xyz'", "frame"]),
-    ({"load_cell__samples": 9}, ["there is no key 'load_cell.samples'", "[scan]"]),
     ({"load_cell__frce_noise": 9}, ["there is no key 'load_cell.frce_noise'", "'force_noise'"]),
     ({"load_cell__frame": "loose"}, ["load_cell.frame is 'loose'"]),
     ({"load_cell__force_noise": -1.0}, ["load_cell", "force_noise is -1.0"]),

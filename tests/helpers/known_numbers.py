@@ -45,7 +45,7 @@ def scaled(length: float, rigidity: float):
     whole = Rod(length, rigidity, rest_curvature=0.2 / length, taper=0.2, **options)
     moment, force = whole.moment_unit, whole.force_unit
     units = {
-        name: (force if name.startswith("force") else moment) ** of.of_moment * length**of.of_length
+        name: (force if name.startswith("force") else moment) ** of.powers[0] * length ** of.powers[1]
         for name, of in PARAMETERS.items()
     } | dict.fromkeys(("base_2_x", "base_2_y"), length)
     cell = replace(

@@ -11,7 +11,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.load_cell.data_sheet import MEMORY
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, LOAD_CELL_UNITS, frame_of, to_dimensionless, write_record
+from tactile_bayes.record import CHANNELS, LOAD_CELL_UNITS, to_dimensionless, write_record
 from tactile_bayes.rig import read_record
 
 rods = st.builds(Rod, st.floats(0.3, 3.0), st.floats(0.3, 3.0))
@@ -121,22 +121,6 @@ def test_the_data_sheet_goes_with_the_record():
     half = ideal()
     half.attrs["load_cell_force_noise"] = 0.5
     assert LoadCell.from_record(half) == LoadCell(force_noise=0.5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ending", ["csv", "nc"])
-@settings(max_examples=4, deadline=None)
-@given(sheet=load_cells(), rod=rods)
-def test_files_keep_the_data_sheet(tmp_path_factory, ending, sheet, rod):
-    measured = sheet.measure(ideal(20, rod=rod), rng=1)
-    assert frame_of(measured) == (sheet.frame or "fixed")
-    path = tmp_path_factory.mktemp("measured") / f"record.{ending}"
-    write_record(measured, path)
-    read = read_record(path)
-    for record in (measured, read):
-        assert LoadCell.from_record(record) == LoadCell.from_entries({**sheet.entries(), "frame": None})
-    for name in (*CHANNELS, "drive_angle"):
-        np.testing.assert_array_equal(read[name], measured[name])
 
 
 def test_a_lever_and_a_backlash_are_kept_with_their_units(tmp_path):

@@ -15,7 +15,6 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import kalman
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.load_cell.drift import Zero
-from tactile_bayes.load_cell.kalman import innovations
 
 N = 40
 SWEEPS = (np.arange(0, 18), np.arange(18, N))
@@ -129,16 +128,9 @@ def test_it_is_exact_where_loads_are_far_above_the_noise(size, length):
     residual = np.random.default_rng(1).standard_normal(count)
     deviation = np.repeat([0.0, size, 3.0 * size], [3, 10, 7])
     steps = np.append(np.inf, np.full(count - 1, step))
-    found, variance = innovations(
-        residual[None, :, None],
-        np.full((1, count, 1), noise),
-        deviation[None, :, None],
-        np.array([np.sqrt(3.0) / length]),
-        np.arange(count),
-        steps,
-        np.zeros((3, 1, 1)),
-        1.0,
-    )
+    discrepancy = Discrepancy(Course(np.arange(count), steps), deviation[:, None], np.asarray(length))
+    still = Zero(*np.zeros((3, 1)), 1.0)
+    found, variance = kalman.given_before(residual[:, None], np.full((count, 1), noise), still, discrepancy)
     with mpmath.workdps(80):
         a = [mpmath.mpf(np.sqrt(3.0) / length) * mpmath.mpf(step) * k for k in range(count)]
         fading = [(1 + each) * mpmath.exp(-each) for each in a]
@@ -151,8 +143,8 @@ def test_it_is_exact_where_loads_are_far_above_the_noise(size, length):
         scaled = mpmath.lu_solve(root, mpmath.matrix(residual.tolist()))
         expected = np.array([float(scaled[i] * root[i, i]) for i in range(count)])
         expected_variance = np.array([float(root[i, i] ** 2) for i in range(count)])
-    np.testing.assert_allclose(variance[0, :, 0], expected_variance, rtol=1e-8)
-    np.testing.assert_allclose(found[0, :, 0], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+    np.testing.assert_allclose(variance[:, 0], expected_variance, rtol=1e-8)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
 
 
 def test_the_covariance_of_a_record_is_written_out():

@@ -85,8 +85,7 @@ def test_an_attribute_or_a_description_of_a_column_in_another_form_is_refused(tm
 
 
 @pytest.mark.parametrize(
-    "line",
-    ["wire 120 mm x 0.5 mm", "see rod_taper above", "Units, mN and mm", "a = b", "rods: three", "12:30 x"],
+    "line", ["wire 120 mm x 0.5 mm", "see rod_taper above", "Units, mN and mm", "a = b", "rods: three", "12:30 x"]
 )
 def test_words_are_no_attributes(line):
     assert stray_attribute(line) is None

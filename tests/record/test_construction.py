@@ -86,10 +86,6 @@ def test_a_channel_may_be_declared_missing():
 def test_attributes_are_kept_as_plain_strings_and_numbers():
     attrs = {"load_cell_force_noise": np.float64(0.5), "rig": "bench 2", "run": np.int64(3)}
     record = make_record(columns(), attrs=attrs)
-    assert [(type(record.attrs[name]), record.attrs[name]) for name in attrs] == [
-        (float, 0.5),
-        (str, "bench 2"),
-        (int, 3),
-    ]
+    assert [repr(record.attrs[name]) for name in attrs] == ["0.5", "'bench 2'", "3"]
     si = make_record(columns(), Rig(rod=WIRE))
     assert make_record(columns(), attrs=si.attrs).identical(si)

@@ -11,10 +11,9 @@ from hypothesis import HealthCheck, given, settings
 
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import csv_rows, parsing
+from tactile_bayes.record import csv_rows
 from tactile_bayes.record.csv_format import read_csv
 from tactile_bayes.record.parsing import integer_in, number_in
-from tactile_bayes.rig import read_record
 
 TESTS = Path(__file__).parents[1]
 USUAL = {
@@ -84,46 +83,6 @@ def test_a_cell_among_usual_ones_is_what_it_is_alone(tmp_path, cell):
                 read_csv(path, {})
         else:
             assert repr(read_csv(path, {}).columns[name][0].tolist()[1]) == repr(parsed)
-
-
-@pytest.mark.slow
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(numbers=st.lists(st.floats(allow_nan=False, width=64) | st.decimals(allow_nan=False), min_size=20, max_size=40))
-@pytest.mark.parametrize("decimal", [".", ","])
-def test_digits_become_the_nearest_double(tmp_path, decimal, numbers):
-    texts = ["0.5", *map(str, numbers)]
-    path = tmp_path / "record.csv"
-    path.write_text("sweep;force_x\n" + "".join(f"0;{text.replace('.', decimal)}\n" for text in texts))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(csv_rows, "_ROWS", 3)
-        values = read_csv(path, {}).columns["force_x"][0]
-    assert values.tobytes() == np.array([float(text) for text in texts]).tobytes()
-
-
-@pytest.mark.parametrize("where", [0, 50, 100])
-def test_a_long_remark_among_many_short_ones(tmp_path, monkeypatch, where):
-    monkeypatch.setattr(csv_rows, "_ROWS", 3)
-    path = tmp_path / "record.csv"
-    notes = ["", "ab"] * 50
-    notes.insert(where, "x" * 1000)
-    path.write_text("\n".join(["sweep,note", *(f"0,{note}" for note in notes)]))
-    values = read_csv(path, {}).columns["note"][0]
-    assert values.dtype.kind == "U"
-    assert values.tolist() == notes
-    monkeypatch.setattr(parsing, "FREE", 500)
-    values = read_csv(path, {}).columns["note"][0]
-    assert values.dtype.kind == "O"
-    assert values.tolist() == notes
-
-
-def test_a_refusal_far_down_names_its_line(tmp_path):
-    path = tmp_path / "record.csv"
-    rows = [f"0,forward,{1 + k / 1e5},0.1,0.1,0.1" for k in range(30_000)]
-    rows[20_000] = '0,"forward",1.2,0.1,0.1,oops'
-    rows[10:10] = ["", ""]
-    path.write_text("\n".join(["# rig: bench", "sweep,direction,drive_angle,holding_moment,force_x,force_y", *rows]))
-    with refused(RecordError, "line 20005", "'force_y'", "'oops'"):
-        read_record(path)
 
 
 READING = """

@@ -12,15 +12,7 @@ from helpers.refusals import refused
 from tactile_bayes.errors import RecordError, RecordWarning
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import (
-    CHANNELS,
-    FRAMES,
-    column_of,
-    parsing,
-    record_hash,
-    rod_of,
-    write_record,
-)
+from tactile_bayes.record import CHANNELS, FRAMES, column_of, parsing, record_hash, rod_of, write_record
 from tactile_bayes.rig import Rig, make_record, read_record
 
 HEADER = "sweep,direction,drive_angle,holding_moment,force_x,force_y"
@@ -123,13 +115,7 @@ def test_what_is_written_is_read_as_it_was(tmp_path, suffix, monkeypatch):
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [
-        ("2024-05-01", "2024-05-01"),
-        ('"4711"', "4711"),
-        ("1, 2 and 3", "1, 2 and 3"),
-        (NINES, NINES),
-        (f"{'0' * 5000}7", 7),
-    ],
+    [*((text, text) for text in ("2024-05-01", "1, 2 and 3", NINES)), ('"4711"', "4711"), (f"{'0' * 5000}7", 7)],
 )
 def test_remarks_are_kept(tmp_path, text, value):
     name = "run" if value in (NINES, 7) else "load_cell_model"
@@ -216,7 +202,6 @@ def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
         ([HEADER + ",note", ROW + ',"two\nlines"', ROW.replace("0.5", "x") + ","], ["line 4, column 'holding_moment'"]),
         ([HEADER, ROW, ROW.replace("1.25", "1.0")], ["1.25 rad (line 2)", "1.0 rad (line 3)"]),
         ([HEADER, "0,forward,1,25,0,5,0,125"], ["line 2", "8 cells", "6 columns"]),
-        ([HEADER.replace(",", ";"), ROW], ["line 2", "1 cells", "6 columns"]),
         ([HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"], ["'0,5'"]),
         ([HEADER.replace(",", " "), ROW.replace(",", " ")], ["'sweep'", "(columns: sweep direction drive_angle"]),
         ([HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"], ["line 2, column 'holding_moment'", "'1.000,5'"]),
@@ -243,8 +228,6 @@ def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
         ([HEADER.replace("drive_angle", "x") + ",a/b,a|b", ROW + ",1,2"], ["no column 'drive_angle'"]),
         ([HEADER, ROW + '"' + "x" * 200_000], ["line 2", "cannot be read"]),
         (["# load_cell_bias_fx: 12.5 [mN]", HEADER, ROW], ["line 1", "'12.5 [mN]'", "'bias_force_x'"]),
-        (["# load_cell_noise_force: 0,003 [N]", HEADER, ROW], ["line 1", "'noise_force'", "'force_noise'"]),
-        (["# load_cell_noise_force: 3 mN", HEADER, ROW], ["line 1", "'noise_force'", "'force_noise'"]),
         (["# load_cell_bias_fx: 0,0125", HEADER, ROW], ["line 1", "'load_cell_bias_fx'", "'0,0125'"]),
         (["# load_cell_serial: 4711", HEADER, ROW], ["line 1", "not begin with 'load_cell_'"]),
         (["# load_cell_force_noise: -1", HEADER, ROW], ["line 1", "'load_cell_force_noise'", "-1.0"]),
@@ -252,7 +235,6 @@ def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
         ([f"# rod_length: 1 [{'Gm9 ' * 40}]", HEADER, ROW], ["line 1", "rod_length", "[Gm9"]),
         ([f"{HEADER},note", f"{ROW},a\0b"], ["line 2", "NUL", "0x00"]),
         (["# note: a\0b", HEADER, ROW], ["line 1", "NUL", "0x00"]),
-        ([f"{HEADER},note", f"{ROW},a", f"{ROW},{'x' * 131_073}"], ["line 3", "cannot be read"]),
         (['# note: "a\\u0000"', HEADER, ROW], ["line 1, attribute 'note'", "NUL", "0x00"]),
         (['# note: "\\ud800"', HEADER, ROW], ["line 1, attribute 'note'", "surrogate"]),
         (['# column note: text [m] "\\ud800"', f"{HEADER},note", f"{ROW},a"], ["line 1, column 'note'", "surrogate"]),

@@ -75,11 +75,6 @@ def test_a_file_states_its_format_and_a_newer_one_is_refused(tmp_path, name, err
         (read_record if error is RecordError else read_result)(path)
 
 
-def test_the_name_of_the_format_is_no_attribute_of_a_record():
-    with refused(RecordError, "record_format"):
-        make_record(columns(), attrs={"record_format": 1})
-
-
 def sealed(path):
     """Give a file the last line that a file of our own has."""
     content = path.read_bytes()

@@ -77,11 +77,6 @@ def test_turning_points_are_those_of_the_definition(angle, least):
     assert turning_points(np.array(angle, float), least) == expected
 
 
-def test_a_sweep_of_one_sample_is_refused():
-    with refused(RecordError, "one sample, sample 2", "no direction"):
-        split([1.0, 1.1, 1.0], base_x=(np.array([0.0, 0.0, 1.0]), {}))
-
-
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_a_file_without_sweeps_is_split(tmp_path, suffix):
     missing = ("force_x", "force_y")

@@ -27,7 +27,8 @@ NAMES = (*PARAMETERS, "base_2_x", "base_2_y")
 def unit_of(row):
     """The unit of a parameter in calculations without dimensions, from the powers that its row states."""
     first = ROD.force_unit if row.name.startswith("force") else ROD.moment_unit
-    return first**row.of_moment * ROD.length**row.of_length
+    of_load, of_length = row.powers
+    return first**of_load * ROD.length**of_length
 
 
 @pytest.mark.parametrize("name", NAMES)

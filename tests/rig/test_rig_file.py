@@ -125,17 +125,6 @@ def test_what_is_written_is_read_as_it_was(rig, tmp_path):
     assert path.read_text(encoding="utf-8").startswith("# A rig")
 
 
-def test_a_calibration_is_read_as_it_was(tmp_path):
-    Rig(calibration=CALIBRATION).write(tmp_path / "rig.toml")
-    found = Rig.read(tmp_path / "rig.toml").calibration
-    assert (found.error, found.source, dict(found.stated)) == (0.0123, "0f 1e", dict(CALIBRATION.stated))
-    points = CALIBRATION.draw(np.random.default_rng(1), 20)
-    np.testing.assert_allclose(found.log_dependence(points), CALIBRATION.log_dependence(points), rtol=1e-12)
-    for name, prior in CALIBRATION.priors.items():
-        np.testing.assert_array_equal(found.priors[name].ppf([0.1, 0.9]), prior.ppf([0.1, 0.9]))
-    assert found.posterior is None
-
-
 def test_distributions_of_ones_own_are_not_written(tmp_path):
     own = stats.rv_histogram((np.ones(4), np.linspace(0.3, 0.7, 5)))()
     rig = Rig(unknown={"friction": own})
@@ -265,12 +254,9 @@ def test_a_shape_may_have_diameters(tmp_path):
     assert by_modulus.flexural_rigidity == pytest.approx(2e11 * np.pi * 2e-3**4 / 64.0)
 
 
-@pytest.mark.parametrize(("unit", "scale"), [("mm", 1e3), ("cm", 1e2)])
-def test_a_shape_has_the_unit_in_its_names(tmp_path, unit, scale):
-    write_shape(tmp_path, scale * 0.1 * S, scale * 0.02 * S**2, f"x [{unit}],y [{unit}]")
-    found = read(tmp_path / "rig.toml", SHAPED).rod
-    assert found.length == pytest.approx(RODS["traced"].length, rel=1e-12)
-    assert not found.is_dimensionless
+def test_a_shape_has_the_unit_in_its_names(tmp_path):
+    write_shape(tmp_path, 10.0 * S, 2.0 * S**2, "x [cm],y [cm]")
+    assert read(tmp_path / "rig.toml", SHAPED).rod.length == pytest.approx(RODS["traced"].length, rel=1e-12)
     write_shape(tmp_path, 0.1 * S, 0.02 * S**2, "x [L],y [L]")
     with refused(ParameterError, "shape.csv", "rod lengths"):
         read(tmp_path / "rig.toml", SHAPED)
@@ -313,7 +299,6 @@ WRONG = {
     "a table that is none": ("rod = 1", "rod"),
     "another unit": ('[rod]\nlength = "3 N"\nflexural_rigidity = 1e-5', "rod.length.*not in"),
     "a list": ("[rod]\nlength = [1.0]\nflexural_rigidity = 1e-5", "rod.length"),
-    "a switch": ("[rod]\nlength = true\nflexural_rigidity = 1e-5", "rod.length"),
     "a length alone": ("[rod]\nlength = 0.1", "flexural_rigidity"),
     "a modulus alone": ("[rod]\nlength = 0.1\nyoungs_modulus = 1e11", "diameter"),
     "a shape alone": ("[rod]\nshape = 'shape.csv'", "flexural_rigidity"),

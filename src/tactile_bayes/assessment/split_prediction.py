@@ -14,7 +14,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import points_of, predicted_points
 from tactile_bayes.inference.result import best_draw
-from tactile_bayes.load_cell.covariance import wandering_deviation
+from tactile_bayes.load_cell.lone_samples import wandering_deviation
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.planning.record_information import NoiseWhitening, prior_precision, scaled_cell, whitening

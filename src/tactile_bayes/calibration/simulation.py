@@ -17,7 +17,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.unknowns import RigValues
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.corruption import corrupted_angles
+from tactile_bayes.load_cell.measurement import corrupted_angles
 from tactile_bayes.record import CHANNELS, bases_of, rod_of
 from tactile_bayes.rig.parameters import GROUPS, parameter_named
 from tactile_bayes.rig.stated import by_channel, of_all_channels, rod_with, sensor_values

@@ -44,16 +44,17 @@ def rig(
     return Answer(_words(stated, said), lambda: {"rig": stated.tables, "known": stated.known, "said": said})
 
 
-# Units of the rod, by whether that is of a force, and powers of the moment's and the length's.
+# Units of the rod, by those of SI.
 _UNITS = {
-    (False, 0, 0): "",
-    (False, 0, 1): "L",
-    (False, 0, -1): "1/L",
-    (False, 1, 0): "EI/L",
-    (False, -1, 0): "L/EI",
-    (False, -1, 2): "L³/EI",
-    (False, -2, 0): "(L/EI)²",
-    (True, 1, 0): "EI/L²",
+    "s": "s",
+    "m": "L",
+    "1/m": "1/L",
+    "m/N": "L³/EI",
+    "N m": "EI/L",
+    "N": "EI/L²",
+    "1/N/m": "L/EI",
+    "rad/(N m)": "L/EI",
+    "1/N²/m²": "(L/EI)²",
 }
 
 
@@ -105,8 +106,7 @@ def _default(parameter: Parameter) -> str:
         return f"{kind} {parameter.width:g}"
     if parameter.unit == "rad":
         return f"{kind} {math.degrees(parameter.width):.3g}°"
-    unit = "s" if parameter.unit == "s" else _UNITS[parameter.unit == "N", parameter.of_moment, parameter.of_length]
-    return f"{kind} {parameter.width:g} {unit}".strip()
+    return f"{kind} {parameter.width:g} {_UNITS.get(parameter.unit, '')}".strip()
 
 
 def _said(rig: Rig) -> dict[str, str]:

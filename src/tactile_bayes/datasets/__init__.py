@@ -7,13 +7,4 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_specification
 from tactile_bayes.datasets.verification import Verification, verify
 
-__all__ = [
-    "Specification",
-    "Verification",
-    "contour_of",
-    "generate",
-    "open",
-    "read_specification",
-    "record",
-    "verify",
-]
+__all__ = ["Specification", "Verification", "contour_of", "generate", "open", "read_specification", "record", "verify"]

@@ -13,9 +13,8 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.variations import Variation, quantity_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig.drawn import calibrated_at, unknown_of
 from tactile_bayes.rig.parameters import GROUPS, MEMORY, NEUTRAL, parameter_named
-from tactile_bayes.rig.rig import Rig
+from tactile_bayes.rig.rig import Rig, unknown_of
 from tactile_bayes.rig.rig_file import unit_of_unknown
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated, within_bounds
@@ -30,6 +29,11 @@ _OF_CELL = {
     **{name: name for name in GROUPS["lever"]},
     "drive_angle_offset": "drive_angle_offset",
     "backlash": "drive_angle_backlash",
+}
+# Parameters that replace numbers of the data sheets, by the keys of these.
+_IN_PLACE = {
+    **{f"rod.{name}": name for name in ("length", "rest_curvature", "taper", "stem")},
+    **{f"load_cell.{name}": name for name in GROUPS["moment_curve"]},
 }
 
 
@@ -64,7 +68,8 @@ def deviations_of_table(
         del every["backlash"]
     if gauge := [name for name in GROUPS["gauge"] if name in every]:
         raise SpecificationError(f"unknown.{gauge[0]} is of the record of a gauge: leave it out of a data set")
-    kept = {name: variation for name, variation in every.items() if not _is_as_stated(name, variation)}
+    neutral = {name: getattr(parameter_named(name), "neutral", None) for name in every}
+    kept = {name: of for name, of in every.items() if of.kind != "constant" or of.numbers[0] != neutral[name]}
     return {**kept, **dict.fromkeys(found, Variation("calibrated"))}
 
 
@@ -80,11 +85,6 @@ def _checked(given: Mapping[str, Variation]) -> dict[str, Any]:
     }
 
 
-def _is_as_stated(name: str, variation: Variation) -> bool:
-    parameter = parameter_named(name)
-    return variation.kind == "constant" and parameter is not None and variation.numbers[0] == parameter.neutral
-
-
 def is_around_the_stated(key: str, variation: Variation) -> bool:
     """Return True for a deviation that `drawn_deviations` draws."""
     return key.startswith("unknown.") and variation.kind not in _DISCRETE
@@ -93,10 +93,7 @@ def is_around_the_stated(key: str, variation: Variation) -> bool:
 def drawn_deviations(
     spec: Specification, values: Mapping[str, Floats], shares: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """Return the deviations that are drawn around what data sheets state, by the keys of their distributions.
-
-    Shapes: values (n,), shares (n,).
-    """
+    """Return deviations drawn around what data sheets state, shape (n,), by the keys of their distributions."""
     drawn = {name: v for name, v in spec.unknown.items() if v.kind not in _DISCRETE}
     if not drawn:
         return {}
@@ -107,7 +104,7 @@ def drawn_deviations(
             found[name] = within_bounds(name, distribution, shares[f"unknown.{name}"])
     if spec.calibration is not None:
         joint = np.stack([shares[f"unknown.{name}"] for name in spec.calibration.priors], axis=1)
-        found |= calibrated_at(spec.calibration, joint)
+        found |= spec.calibration.at_shares(joint)
     return {f"unknown.{name}": numbers for name, numbers in found.items()}
 
 
@@ -130,39 +127,20 @@ def _stated(values: Mapping[str, Floats], count: int) -> Stated:
 
 
 def as_built(spec: Specification, values: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the numbers of rods, load cells and pivots with the deviations from what data sheets state.
-
-    Shapes: values (n,).
-    """
+    """Return numbers of rods, load cells and pivots, shape (n,), with the deviations from what data sheets state."""
     built = dict(values)
     off = {name: values[f"unknown.{name}"] for name in spec.unknown}
-    if off:
-        one, zero = np.ones(len(next(iter(off.values())))), np.zeros(len(next(iter(off.values()))))
-        _build_rod(built, off, one)
-        _build_cell(built, off, one, zero)
-        for key, name in pivot_keys(spec).items():
-            if name in off:
-                built[key] = built[key] + off[name]
-    return built
-
-
-def _build_rod(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats) -> None:
+    if not off:
+        return built
+    one = np.ones(len(next(iter(off.values()))))
     if "rigidity_scale" in off:
         built["rod.flexural_rigidity"] = off["rigidity_scale"] * built.get("rod.flexural_rigidity", one)
     if "length" in off and "rod.rest_curvature" in built:  # it keeps its turn from base to tip
         built["rod.rest_curvature"] = built["rod.rest_curvature"] * built.get("rod.length", one) / off["length"]
-    for name in ("length", "rest_curvature", "taper", "stem"):
-        if name in off:
-            built[f"rod.{name}"] = off[name]
-
-
-def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats, zero: Floats) -> None:
+    built |= {key: off[name] for key, name in _IN_PLACE.items() if name in off}
     for name, entry in _OF_CELL.items():
         if name in off:
-            built[f"load_cell.{entry}"] = built.get(f"load_cell.{entry}", zero) + off[name]
-    for name in GROUPS["moment_curve"]:
-        if name in off:
-            built[f"load_cell.{name}"] = off[name]
+            built[f"load_cell.{entry}"] = built.get(f"load_cell.{entry}", 0.0 * one) + off[name]
     for what, names in MEMORY.items():
         keys = [f"load_cell.{what}_{channel}" for channel in CHANNELS]
         built |= dict.fromkeys(keys, off[what]) if what in off else {}
@@ -172,6 +150,8 @@ def _build_cell(built: dict[str, Floats], off: Mapping[str, Floats], one: Floats
         key = f"load_cell.gain_{to}_{of}"
         if gains[of] in off and (to == of or key in built):
             built[key] = off[gains[of]] * built.get(key, one)
+    built |= {key: built[key] + off[name] for key, name in pivot_keys(spec).items() if name in off}
+    return built
 
 
 def pivot_keys(spec: Specification) -> dict[str, str]:

@@ -90,12 +90,9 @@ _CORRECTIONS = {
 
 @threadpool_limits.wrap(limits=1)  # with more threads, products of matrices are rounded otherwise
 def generate_records(spec: Specification, begin: int, end: int) -> Records:
-    """Generate records from index `begin` to before `end`, each the first draw that all sweeps reach and leave clear.
-
-    The number of draws ahead doubles for the remaining records each time, since most of the cost is per call. The
-    random numbers of a record depend on the seed and its index only, and those of its contour are drawn before all
-    others. Rounding may depend on the records that are generated together: only the same range of records gives
-    identical bits.
+    """Generate records from index `begin` to before `end`, each the first draw that all sweeps reach and leave clear;
+    the draws ahead double for the remaining records. Random numbers of a record depend on seed and index only, those of
+    its contour come first; rounding may depend on the records generated together: the same range gives identical bits.
     """
     index = np.arange(begin, end)
     drawn = {key: np.full(index.size, np.nan) for key in spec.numbers}
@@ -141,8 +138,7 @@ def _state_pivots(spec: Specification, records: Records) -> None:
 
 
 def directions_of(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
-    """Return the directions of the sweeps, 0 forward and 1 backward, shape (sweeps,), or (n, sweeps) of a base that is
-    carried."""
+    """Return directions, 0 forward and 1 backward, shape (sweeps,), or (n, sweeps) where the base is carried."""
     if spec.translations:
         return sweep["direction"]
     return np.array([direction == "backward" for _, direction in spec.sweeps], dtype=np.int8)
@@ -313,7 +309,9 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
 def _of_sweeps(spec: Specification, tried: _Followed) -> dict[str, NDArray[Any]]:
     """Columns of every sweep, shape (n,)."""
     paths = tried.paths
-    phases = np.array([_touching(phases) for phases in phases_of(paths)], dtype=object)
+    # Of tip and tangential contact alone, whether they slide or stick.
+    words = ("-".join(phase for phase, _ in groupby(phases.upper().split("-"))) for phases in phases_of(paths))
+    phases = np.array(list(words), dtype=object)
     if spec.translations:
         found = {"direction": paths.sweep_frame.mirrored.astype(np.int8), "phases": phases}
     else:
@@ -329,11 +327,6 @@ def _of_sweeps(spec: Specification, tried: _Followed) -> dict[str, NDArray[Any]]
             paths.largest_curvature * paths.sweep_frame.standoff / paths.sweep_frame.length
         )
     return found
-
-
-def _touching(phases: str) -> str:
-    """Return phases as `phases_of` writes them, of tip and tangential contact alone, whether they slide or stick."""
-    return "-".join(phase for phase, _ in groupby(phases.upper().split("-")))
 
 
 def _of_samples(tried: _Followed, index: Index) -> dict[str, NDArray[Any]]:

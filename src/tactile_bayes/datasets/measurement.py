@@ -14,7 +14,7 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed
-from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
+from tactile_bayes.load_cell.measurement import corrupted_angles, corrupted_loads
 from tactile_bayes.record import CHANNELS, loads_of, turned
 
 _OF_ENCODER = ("drive_angle_offset", "drive_angle_backlash", "drive_angle_noise")
@@ -46,10 +46,7 @@ def measure(
     sample: dict[str, NDArray[Any]],
     backward: NDArray[np.int8],
 ) -> None:
-    """Add the readings of load cells as they are built to the true values, each record with random numbers of its own.
-
-    Directions are 0 forward, 1 backward.
-    """
+    """Add the readings of load cells as built, each record's with its own random numbers; backward is 1, else 0."""
     count = len(noise)
     columns = {key.removeprefix("load_cell."): v for key, v in built.items() if key.startswith("load_cell.")}
     cells, cell_of, scale = _cells(columns, count)
@@ -103,8 +100,7 @@ def _cells(columns: dict[str, Floats], count: int) -> tuple[list[LoadCell], Inde
 
 
 def _like(first: LoadCell, rows: list[dict[str, float]], differ: set[str]) -> list[LoadCell]:
-    """Make load cells that differ from the first in valid entries, without a check, which would take longer than the
-    noise."""
+    """Make load cells like the first but for valid entries, without a check, which takes longer than the noise."""
     cells = []
     for row in rows:
         fields = dict(vars(first))

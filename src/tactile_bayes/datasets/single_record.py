@@ -137,7 +137,11 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
             attrs[name] = float(variable)
     if spec.single:
         entries = {n.removeprefix("load_cell_"): v for n, v in attrs.items() if n.startswith("load_cell_")}
-        _restore_limits(columns, LoadCell.from_entries(entries))
+        # Readings at the end of the range, which 32 bits have rounded, are moved back to it.
+        for name, limit in zip(CHANNELS, LoadCell.from_entries(entries).limit, strict=True):
+            with np.errstate(over="ignore"):
+                at_limit = np.abs(columns[name]) == np.float32(limit)
+            columns[name][at_limit] = np.copysign(limit, columns[name][at_limit])
     attrs |= {f"truth_{name}": float(data[f"truth_{name}"]) for name in spec.unknown}
     if not truth:
         attrs = {name: value for name, value in attrs.items() if not name.startswith("truth_")}
@@ -145,11 +149,3 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
     rod = Rod(**{name: float(data[f"rod_{name}"]) for name in names}) if names else None
     known = {name: columns[name] for name in (*COLUMNS, *columns) if name in columns and column_of(name) is not None}
     return make_record(known, Rig(rod=rod, load_cell=LoadCell(frame=spec.frame)), attrs=attrs)
-
-
-def _restore_limits(columns: dict[str, Any], cell: LoadCell) -> None:
-    """Move readings at the end of the range, which 32 bits have rounded, back to it."""
-    for name, limit in zip(CHANNELS, cell.limit, strict=True):
-        with np.errstate(over="ignore"):
-            at_limit = np.abs(columns[name]) == np.float32(limit)
-        columns[name][at_limit] = np.copysign(limit, columns[name][at_limit])

@@ -49,10 +49,8 @@ class Group:
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive angles of a sweep: `samples` evenly spaced ones from `begin` to `end` [rad], or about the contact.
-
-    About the contact, `margin` is the range before first contact and after snap-off, in shares of the angle between
-    them.
+    """Drive angles of a sweep: `samples` evenly spaced ones from `begin` to `end` [rad], or about the contact, with
+    `margin` before first contact and after snap-off, in shares of the angle between them.
     """
 
     samples: int
@@ -214,9 +212,7 @@ class Specification:
 
 
 def meaning(text: str) -> dict[str, Any]:
-    """Return the meaning of the text of a specification.
-
-    It does not depend on comments, layout, the notation of numbers (1 or 1.0), or explicit default values."""
+    """Return the meaning of a specification's text, without comments, layout, notation and written defaults."""
     said = without(DEFAULTS, read_toml(text))
     said["contours"] = [
         without({"weight": 1.0, **left_out(FAMILIES[group["family"]])}, group) for group in said["contours"]

@@ -12,14 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from tactile_bayes.checks import (
-    check_choice,
-    check_kind,
-    check_number,
-    check_path,
-    check_whole_number,
-    refused,
-)
+from tactile_bayes.checks import check_choice, check_kind, check_number, check_path, check_whole_number, refused
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.datasets.deviations import deviations_of_table
@@ -30,6 +23,7 @@ from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rods.rod import Rod, round_rigidity
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
+from tactile_bayes.record.schema import SIGNED
 from tactile_bayes.record.spelling import look_alikes, refuse_unknown_keys
 from tactile_bayes.rig import Rig
 from tactile_bayes.rig.rig_file import ROD_UNITS, calibration_of, entries_of_cell, keys_of, refuse_twice
@@ -46,8 +40,6 @@ _TABLES: Mapping[str, Iterable[str]] = {
     **{name: OF_RIG[name] for name in ("rod", "load_cell", "unknown", "calibration")},
 }
 _TRACED = ("shape", "rigidity_profile")  # what rig.toml states along a rod, and no data set draws
-# Beginnings of the entries of a load cell that may be negative.
-_SIGNED = ("bias_h", "bias_f", "gain_", "lever_", "moment_curve_", "correlation_", "drive_angle_o", "drive_angle_b")
 _OF_ROTATIONS = ("bases", "directions", "from_degrees", "to_degrees", "margin")
 _OF_TRANSLATIONS = ("base", "heading", "drive_angle", "turn", "travel", "step")
 
@@ -226,8 +218,7 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
 
 
 def _refuse_no_contour(family: ContourFamily, distributions: Mapping[str, Variation], key: str) -> None:
-    """Refuse parameters that are impossible for any values of the others, by the ends of the distributions; draws from
-    unbounded distributions are tested later."""
+    """Refuse parameters that are impossible whatever the others; unbounded distributions are tested later."""
     possible = {name: np.full(1, 2.0 if name.endswith("n") else 1.0) for name in family.parameters}
     for name, distribution in distributions.items():
         numbers = distribution.numbers
@@ -288,7 +279,7 @@ def _load_cell(table: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
         except ParameterError as error:
             raise SpecificationError(f"load_cell: {error}") from error
     for name, of in distributions.items():
-        if not name.startswith(_SIGNED):
+        if not name.startswith(SIGNED):
             _refuse_outside(f"load_cell.{name}", of)
     return distributions
 

@@ -21,12 +21,9 @@ _WORDS = {"default": "the default of the rig", "calibrated": "as the calibration
 
 @dataclass(frozen=True)
 class Variation:
-    """A number for each record: constant, drawn, or from a list in turn.
-
-    Kinds are those of `KINDS`; constant; choice, one of a list with equal probabilities; each, the numbers of a list in
-    turn, in all combinations with the specification's other lists, except those on the same axis, which advance in
-    step; scipy, a distribution of `scipy.stats`. Deviations of a rig may be "default" (around what its data sheets
-    state) or "calibrated".
+    """A number for each record: constant, drawn (by `KINDS`, choice, or scipy), "each" of a list in turn, in all
+    combinations with other lists, except those on the same axis, which advance in step; deviations of a rig may be
+    "default" (around what its data sheets state) or "calibrated".
     """
 
     kind: str
@@ -84,9 +81,8 @@ def quantity_of(value: Any, key: str, unit: str, is_si: bool) -> Variation:
 
 
 def variation_of(value: Any, key: str, number: Callable[[Any], float | None] = as_number) -> Variation:
-    """Parse the distribution that a value of a specification states; messages name it by `key`.
-
-    `number` returns a number that stands there, also as a text with a unit, or None if there is none.
+    """Parse the distribution that a value of a specification states; messages name it by `key`. `number` returns a
+    number that stands there, also as a text with a unit, or None if there is none.
     """
     plain = number(value)
     if plain is not None and math.isfinite(plain):

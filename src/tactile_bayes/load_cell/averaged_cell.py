@@ -14,13 +14,8 @@ from tactile_bayes.mechanics.rods.rod import Rod
 
 @dataclass(frozen=True)
 class AveragedCell(LoadCell):
-    """A load cell with white normal noise, of which each sample is the mean of `readings` readings at one load.
-
-    The noise of the entries is that of a single reading. Its steps count as noise, since a mean has none.
-
-    >>> AveragedCell(force_noise=0.04, moment_noise=0.02, readings=np.array([1, 4])).deviation(np.zeros((2, 3)))
-    array([[0.02, 0.04, 0.04],
-           [0.01, 0.02, 0.02]])
+    """A load cell with white normal noise, of which each sample is the mean of `readings` readings at one load. The
+    noise of the entries is that of a single reading. Its steps count as noise, since a mean has none.
     """
 
     readings: Floats = field(default_factory=lambda: np.ones(1), compare=False)  # shape (samples,)

@@ -17,12 +17,9 @@ _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 class Blocks(NamedTuple):
-    """Samples of a record that stand for blocks of neighbouring readings, each array by sample.
-
-    The readings of a block have a straight line over the drive angle. Two samples on it, a standard deviation of the
-    drive angles on either side of their mean, and with half of the readings each, have the mean and the slope of the
-    readings, and their uncertainties: the likelihood of all readings is that of the two samples, times that of the
-    scatter about the line, for any loads that are straight in the block, and nearly so for curved ones.
+    """Samples that stand for blocks of neighbouring readings on a straight line over the drive angle: two points of it,
+    with mean, slope and uncertainties of the readings. The likelihood of all readings is that of the two points, times
+    that of the scatter about the line, for loads that are straight in the block, and nearly so for curved ones.
     """
 
     # Number of readings of which it is the mean, or half of those of whose line it is one of two points.
@@ -41,10 +38,7 @@ class Blocks(NamedTuple):
         return cls(readings, freedom, scatter / np.square(rod.load_units))
 
     def log_density_within(self, deviation: Floats, present: Flags, *, pointwise: bool) -> Floats:
-        """Return the log-density of the readings of blocks, given their means and slopes.
-
-        Shapes: deviation (..., 1 or samples, 3), present (3,).
-        """
+        """Return the log-density of readings given means and slopes; deviation (..., 1 or samples, 3), present (3,)."""
         deviation = deviation[..., present]
         scatter, freedom = self.scatter[:, present], self.freedom[:, None]
         if not pointwise and deviation.shape[-2] == 1:

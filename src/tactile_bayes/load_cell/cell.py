@@ -14,12 +14,11 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_array, check_kind, check_optional, check_switch, refused
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.load_cell.corruption import corrupted_loads
-from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.likelihood import checked_noise_scale, log_likelihood, wandering_sizes
-from tactile_bayes.load_cell.measurement import corrected, measured, stated_entries
+from tactile_bayes.load_cell.lone_samples import covariance, squared_mahalanobis_distance
+from tactile_bayes.load_cell.measurement import corrected, corrupted_loads, measured, stated_entries
 from tactile_bayes.load_cell.zero_load import found_cell
 from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import CHANNELS, frame_of, validate
@@ -299,12 +298,7 @@ class LoadCell(DataSheet):
             )
 
     def simulate(
-        self,
-        loads: ArrayLike,
-        *,
-        rng: Rng,
-        noise_scale: ArrayLike = 1.0,
-        discrepancy: Discrepancy | None = None,
+        self, loads: ArrayLike, *, rng: Rng, noise_scale: ArrayLike = 1.0, discrepancy: Discrepancy | None = None
     ) -> Floats:
         """Simulate the readings of loads, as arrays.
 

@@ -37,10 +37,7 @@ class ContactBounds:
 
 
 def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> ContactBounds:
-    """Find contact, its onset and its snap-off in one sweep; the method is that of `zero_load`.
-
-    Shapes: readings (samples, channels), floor (channels,).
-    """
+    """Find contact and its bounds in the readings of one sweep, (samples, channels), by the method of `zero_load`."""
     n = len(readings)
     readings = readings - readings[0]
     p_value, before, after = _contact(readings, floor)
@@ -103,9 +100,8 @@ def _contact(readings: Floats, floor: Floats) -> tuple[float, int, int]:
 
 
 def _course(readings: Floats, floor: Floats) -> float:
-    """Upper bound of the p-value of no contact, from a course of the readings that is smooth and large.
-
-    A parabola is fitted to each channel (an F-test, exact in white normal noise); 1 if none spans `_FIRM` deviations.
+    """Upper bound of the p-value of no contact, from a course of the readings that is smooth and large: a parabola for
+    each channel (an F-test, exact in white normal noise); 1 if none spans `_FIRM` deviations.
     """
     n, channels = readings.shape
     if n < _FEWEST_OF_COURSE:
@@ -124,10 +120,7 @@ def _course(readings: Floats, floor: Floats) -> float:
 
 
 def _clipped(readings: Floats, floor: Floats) -> Floats:
-    """Clip readings that exceed both neighbours, at three deviations from the median or at the neighbour.
-
-    Nothing is clipped where half of the readings are equal.
-    """
+    """Clip readings beyond both neighbours at three deviations from the median, unless half of them are equal."""
     off = readings - np.median(readings, axis=0)
     deviation = DEVIATION_OVER_MEDIAN * np.median(np.abs(off), axis=0)
     limit = np.where(deviation > 0.0, _CLIP * np.sqrt(deviation**2 + floor), np.inf)
@@ -139,15 +132,12 @@ def _clipped(readings: Floats, floor: Floats) -> Floats:
 @lru_cache(maxsize=256)
 def _tested_ends(n: int) -> tuple[Index, Index]:
     """Return the numbers of samples at both ends of a sweep of n samples that are compared with the rest."""
-    ends = [k for k in _grid(n) if k < n]
+    # 0, and steps of half an octave: 1, 2, 3, 4, 6, 8, 12, ...
+    ends = [0, 1, *sorted(factor << k for k in range(n.bit_length()) for factor in (2, 3) if factor << k < n)]
+    ends = [k for k in ends if k < n]
     before, after = (k.ravel() for k in np.meshgrid(ends, ends))
     tested = (before + after >= FEWEST) & (before + after < n)
     return before[tested], after[tested]
-
-
-def _grid(n: int) -> list[int]:
-    """Return 0, and steps of half an octave: 1, 2, 3, 4, 6, 8, 12, ..."""
-    return [0, 1, *sorted(factor << k for k in range(n.bit_length()) for factor in (2, 3) if factor << k < n)]
 
 
 def _sums(values: Floats) -> Floats:
@@ -212,9 +202,8 @@ def _neighboured(z: Floats) -> Flags:
 
 
 def _last_before_ramp(readings: Floats, loaded: int, after: int, false_alarm: float, floor: Floats) -> int:
-    """Lower limit of the last unloaded sample, for a load that grows linearly from zero up to the loaded sample.
-
-    Bias and slope are fitted by least squares for every possible start of the ramp; samples after contact are included.
+    """Lower limit of the last unloaded sample, for a load that grows linearly from zero up to the loaded sample: bias
+    and slope are least squares for every possible start of the ramp; samples after contact are included.
     """
     n, channels = readings.shape
     known = np.concatenate([readings[: loaded + 1], readings[max(n - after, loaded + 1) :]])

@@ -1,7 +1,5 @@
-"""The curve of a sensor whose reading is not in proportion to the moment, as of a Hall sensor.
-
-With a moment M it reads what a sensor without a curve reads of M + a M² + b M³. Where this cubic turns back, beyond the
-nearest extremum on either side of zero, the sensor is saturated: it reads what it reads at the extremum.
+"""The curve of a sensor whose reading is not in proportion to the moment, as of a Hall sensor: with a moment M it reads
+what a sensor without a curve reads of M + a M² + b M³, up to the nearest extremum on either side, where it saturates.
 """
 
 from __future__ import annotations

@@ -163,10 +163,7 @@ class DataSheet:
 
     @property
     def has_variances(self) -> bool:
-        """True if the white noise of every channel has a positive, finite variance, which weights the channels.
-
-        It has none without a stated noise, nor with 2 degrees of freedom or fewer.
-        """
+        """True if the white noise of every channel has a positive, finite variance, which weights the channels."""
         return self.degrees_of_freedom > 2.0 and bool(np.all(self.noise > 0.0))
 
     @property
@@ -229,10 +226,8 @@ class DataSheet:
         return np.clip(readings, -self.limit, self.limit) if is_limited else readings
 
     def expected(self, loads: Floats) -> Floats:
-        """Readings of loads, shape (..., 3), without noise: lever, curve of the moment, gain and bias.
-
-        A channel that was not measured is NaN throughout; it affects others only through cross-talk, or the moment
-        through its lever.
+        """Readings of loads, shape (..., 3), without noise: lever, curve of the moment, gain and bias. A channel that
+        was not measured is NaN throughout; it affects others only through cross-talk, or the moment through its lever.
         """
         loads = check_array("loads", loads, _LOADS)
         if loads.shape[-1:] != (len(CHANNELS),):
@@ -256,9 +251,8 @@ class DataSheet:
         return np.stack([curved(moment, *self.moment_curve), loads[..., 1], loads[..., 2]], axis=-1)
 
     def loads_of(self, readings: Floats, present: slice | Index = slice(None)) -> Floats:
-        """Return the loads, shape (..., channels), of readings of the present channels without bias.
-
-        Where the curve of the moment turns back, readings beyond are taken for the last one before.
+        """Return the loads, shape (..., channels), of readings of the present channels without bias. Where the curve of
+        the moment turns back, readings beyond are taken for the last one before.
         """
         if not any(self.moment_curve) or 0 not in np.arange(len(CHANNELS))[present]:
             return np.asarray(readings @ np.linalg.inv(self.gain_matrix[present][:, present]).T)

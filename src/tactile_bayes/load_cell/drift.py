@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError
 
 @dataclass(frozen=True)
 class _DriftProcess:
-    """Process d(i+1) = decay · d(i) + a normal step, with a normal d at the first sample, channel by channel."""
+    """Process d(i+1) = decay · d(i) + a normal step, channel by channel: a random walk from zero, unless overridden."""
 
     moment: float = 0.0
     force: float = 0.0
@@ -34,17 +34,17 @@ class _DriftProcess:
     @property
     def decay(self) -> float:
         """Factor on the drift from one sample to the next."""
-        raise NotImplementedError
+        return 1.0
 
     @property
     def initial_variance(self) -> float:
         """Variance of the drift at the first sample, over the square of the size."""
-        raise NotImplementedError
+        return 0.0
 
     @property
     def step_variance(self) -> float:
         """Variance of a step, over the square of the size."""
-        raise NotImplementedError
+        return 1.0
 
     def draw(self, normal: Floats) -> Floats:
         """Draw drift from independent standard normal numbers, shape (..., samples, 3)."""
@@ -79,18 +79,6 @@ class RandomWalk(_DriftProcess):
     >>> walk[:, -1].std(axis=0).round(4)  # √99 steps
     array([0.  , 0.01, 0.01])
     """
-
-    @property
-    def decay(self) -> float:
-        return 1.0
-
-    @property
-    def initial_variance(self) -> float:
-        return 0.0
-
-    @property
-    def step_variance(self) -> float:
-        return 1.0
 
 
 @dataclass(frozen=True)

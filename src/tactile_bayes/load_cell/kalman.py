@@ -1,10 +1,9 @@
 """Kalman filter and smoother of readings with drift, bias, a discrepancy and white noise, compiled.
 
-The reading of a channel is weight · g + drift + bias + white noise. g is a Gaussian process of variance one and the
-covariance (1 + rate · d) exp(−rate · d) over the distance d: Matérn's with ν = 3/2, the state of which is g and its
-derivative over the rate (Hartikainen and Särkkä 2010, doi 10.1109/MLSP.2010.5589113). The other states are drift and
-bias. Beside a drift that does not decay, a bias is a part of it; beside one that does, without a discrepancy, it is a
-regression on the filter's response to ones, which holds for a bias that is hardly known.
+The reading of a channel is weight · g + drift + bias + white noise; the state of g, a Gaussian process with Matérn's
+covariance for ν = 3/2, is g and its derivative over the rate (Hartikainen and Särkkä 2010, doi
+10.1109/MLSP.2010.5589113). Beside a drift that does not decay, a bias is a part of it; beside one that does, without a
+discrepancy, it is a regression on the filter's response to ones, which holds for a bias that is hardly known.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import math
 import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.load_cell.discrepancy import Discrepancy
+from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.mechanics.compiler import cached, compiled
 
@@ -39,10 +38,8 @@ def given_before(
 def given_others(
     residual: Floats, noise: Floats, zero: Zero, discrepancy: Discrepancy | None = None
 ) -> tuple[Floats, Floats]:
-    """Return residuals of samples given all others, and their variances.
-
-    With the inverse Q of the covariance of all samples r, they are (Q r)_i / Q_ii and 1 / Q_ii: the smoothed errors of
-    the noise over its variance (de Jong 1988, doi 10.1093/biomet/75.3.594).
+    """Return residuals of samples given all others, and their variances: (Q r)_i / Q_ii and 1 / Q_ii, with the inverse
+    Q of the covariance of all samples r (de Jong 1988, doi 10.1093/biomet/75.3.594).
     """
     if _is_of_states(zero, discrepancy):
         weighed, precision = _run(True, residual, noise, zero, discrepancy)
@@ -50,30 +47,12 @@ def given_others(
         # The bias is a change of rank one of Q: the Sherman–Morrison formula.
         without = zero._replace(bias=np.zeros(1))
         residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-        found = _run(True, np.stack([residual, ones]), noise, without)
-        (weighed, of_one), (precision, _) = found
+        (weighed, of_one), (precision, _) = _run(True, np.stack([residual, ones]), noise, without)
         with np.errstate(divide="ignore"):
             known = 1.0 / zero.bias + of_one.sum(axis=-2, keepdims=True)
         weighed = weighed - of_one * weighed.sum(axis=-2, keepdims=True) / known
         precision = precision - of_one**2 / known
     return weighed / precision, 1.0 / precision
-
-
-def innovations(
-    residual: Floats,
-    noise: Floats,
-    weight: Floats,
-    rate: Floats,
-    order: Index,
-    step: Floats,
-    wandering: Floats,
-    decay: float,
-) -> tuple[Floats, Floats]:
-    """Return innovations of samples given those before in an order, shape (n, samples, channels), and their variances.
-
-    Shapes: weight as residual and noise, rate (n,), wandering (3, n, channels): variances of `Zero`.
-    """
-    return _called(False, (residual, noise, weight), rate, order, step, wandering, decay)
 
 
 def _is_of_states(zero: Zero, discrepancy: Discrepancy | None) -> bool:
@@ -98,37 +77,17 @@ def _run(
     weight, rate = (np.zeros(()), np.zeros(())) if discrepancy is None else (discrepancy.deviation, discrepancy.rate)
     shapes = residual.shape, noise.shape, of_zero[0].shape, weight.shape, (*rate.shape, 1, 1)
     shape = np.broadcast_shapes(*shapes)
-    size = -1, *shape[-2:]
-    residual, noise, weight = (np.broadcast_to(v, shape).reshape(size) for v in (residual, noise, weight))
-    order = np.arange(shape[-2]) if discrepancy is None else discrepancy.course.order
-    step = np.ones(shape[-2]) if discrepancy is None else discrepancy.course.step
-    wandering = np.stack([np.broadcast_to(v, (*shape[:-2], 1, shape[-1])).reshape(-1, shape[-1]) for v in of_zero])
-    rates = np.broadcast_to(rate, shape[:-2]).ravel()
-    found = _called(smooths, (residual, noise, weight), rates, order, step, wandering, zero.decay)
-    return found[0].reshape(shape), found[1].reshape(shape)
-
-
-def _called(
-    smooths: bool,
-    readings: tuple[Floats, Floats, Floats],
-    rate: Floats,
-    order: Index,
-    step: Floats,
-    wandering: Floats,
-    decay: float,
-) -> tuple[Floats, Floats]:
-    """Call the compiled function with room for results, and for mean, covariance, a vector, and gains of states.
-
-    Arrays that are read only, or lie otherwise in memory, would each be another type, for which all is compiled anew.
-    """
-    residual, white, weight, rate, wandering = (
-        np.require(values, requirements=["C", "W"]) for values in (*readings, rate, wandering)
-    )
+    course = Course(np.arange(shape[-2]), np.ones(shape[-2])) if discrepancy is None else discrepancy.course
+    arrays = [np.broadcast_to(values, shape).reshape(-1, *shape[-2:]) for values in (residual, noise, weight)]
+    arrays.append(np.broadcast_to(rate, shape[:-2]).ravel())
+    arrays.append(np.stack([np.broadcast_to(v, (*shape[:-2], 1, shape[-1])).reshape(-1, shape[-1]) for v in of_zero]))
+    # Arrays that are read only, or lie otherwise in memory, would each be another type, for which all is compiled anew.
+    residual, noise, weight, rate, wandering = (np.require(values, requirements=["C", "W"]) for values in arrays)
     found = np.empty(residual.shape), np.empty(residual.shape)
-    gains = np.empty((order.size if smooths else 0, _STATES))
+    gains = np.empty((course.order.size if smooths else 0, _STATES))
     state = np.empty(_STATES), np.empty((_STATES, _STATES)), np.empty(_STATES), gains
-    _filter_all((residual, white, weight), rate, order, step, wandering, decay, smooths, found, state)
-    return found
+    _filter_all((residual, noise, weight), rate, *course, wandering, zero.decay, smooths, found, state)
+    return found[0].reshape(shape), found[1].reshape(shape)
 
 
 @compiled
@@ -191,12 +150,8 @@ def _condition(
 ) -> None:
     """Condition process, drift or both on a reading; a factor keeps the digits that a difference loses."""
     left = noise / variance
-    if drifts:
-        for k in range(_STATES):
-            mean[k] += seen[k] * error / variance
-    else:
-        for k in range(2):
-            mean[k] += seen[k] * error / variance
+    for k in range(_STATES if drifts else 2):
+        mean[k] += seen[k] * error / variance
     if not bends:
         covariance[2, 2] *= left
     elif drifts:

@@ -34,10 +34,7 @@ def log_likelihood(
     discrepancy: Discrepancy | None = None,
     left_out: bool = False,
 ) -> Floats:
-    """Log-density of readings; see `LoadCell.log_likelihood`.
-
-    Dependent samples are conditional on those before, or on all others if `left_out`.
-    """
+    """Log-density of readings, of dependent ones given those before, or all others; see `LoadCell`."""
     check_optional("discrepancy", discrepancy, Discrepancy)
     readings, loads, scale = _checked(measured, predicted, noise_scale)
     present = _present(sheet, readings)
@@ -214,39 +211,17 @@ def _dependent(
         return None
     refuse_inexact(sheet, readings, present, wanders, correlated, discrepancy is not None)
     residual, steps = readings - expected, sheet.resolution[present] ** 2 / 12.0
+    if correlated and not wanders:
+        return correlated_density(residual, deviation, steps, correlation)
+    from tactile_bayes.load_cell.kalman import given_before, given_others  # numba takes a second to load
+
+    given = given_others if left_out else given_before
     if not correlated:
-        return _wandering(sheet, residual, deviation**2 + steps, present, discrepancy, left_out)
-    if wanders:
-        return _wandering_together(sheet, residual, deviation, steps, present, correlation, left_out)
-    return correlated_density(residual, deviation, steps, correlation)
-
-
-def _wandering(
-    sheet: DataSheet,
-    residual: Floats,
-    noise: Floats,
-    present: Index,
-    discrepancy: Discrepancy | None,
-    left_out: bool,
-) -> Floats:
-    """Log-density of each sample given others, for independent noise of the channels."""
-    bias = np.array(sheet.bias_uncertainty)[present] ** 2
-    sizes = bias if sheet.drift is None else sheet.drift.sizes[present] ** 2
-    smooth = None if discrepancy is None else discrepancy.of(present)
-    return normal_density(*_given(left_out, residual, noise, Zero.of(sheet.drift, sizes, bias), smooth))
-
-
-def _wandering_together(
-    sheet: DataSheet,
-    residual: Floats,
-    deviation: Floats,
-    steps: Floats,
-    present: Index,
-    correlation: Floats,
-    left_out: bool,
-) -> Floats:
-    """Log-density of each sample given others, for noise that is correlated between channels and stationary."""
-    # Coordinates in which the white noise has unit covariance and the drifts are independent.
+        bias = np.array(sheet.bias_uncertainty)[present] ** 2
+        sizes = bias if sheet.drift is None else sheet.drift.sizes[present] ** 2
+        smooth = None if discrepancy is None else discrepancy.of(present)
+        return normal_density(*given(residual, deviation**2 + steps, Zero.of(sheet.drift, sizes, bias), smooth))
+    # Coordinates in which the white noise, which is stationary, has unit covariance and the drifts are independent.
     deviation = deviation[..., 0, :] if deviation.ndim > 1 else deviation
     root = np.linalg.cholesky(_covariance(deviation, steps, correlation))
     inverse = np.linalg.inv(root)
@@ -255,16 +230,7 @@ def _wandering_together(
     volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)[..., None]
     none = np.zeros(present.size)
     zero = Zero.of(sheet.drift, share, none) if sheet.drift else Zero(share, none, none, 1.0)
-    return normal_density(*_given(left_out, residual, np.ones(present.size), zero, None)) - volume
-
-
-def _given(
-    left_out: bool, residual: Floats, noise: Floats, zero: Zero, discrepancy: Discrepancy | None
-) -> tuple[Floats, Floats]:
-    """Residuals of each sample given those before, or all others, and their variances."""
-    from tactile_bayes.load_cell.kalman import given_before, given_others  # numba takes a second to load
-
-    return (given_others if left_out else given_before)(residual, noise, zero, discrepancy)
+    return normal_density(*given(residual, np.ones(present.size), zero)) - volume
 
 
 def normal_density(deviation: Floats, variance: Floats) -> Floats:

@@ -1,10 +1,9 @@
-"""The memory of a sensor: a lag of first order, and play, which makes a loop of hysteresis.
+"""The memory of a sensor: a lag of first order, and play, which makes a loop of hysteresis, by samples xₖ in their
+order.
 
-Both act on the loads of a record in its order. With a lag of n readings a share c = exp(−1/n) of the difference is left
-at each reading, yₖ = xₖ + c (yₖ₋₁ − xₖ): a steady change is read c/(1 − c) readings late. A lag of τ seconds is one of
-n = τ/Δt readings, Δt after the one before. With play of half a width r the output stays where it is until the input is
-further from it than r, and follows at that distance: yₖ is yₖ₋₁, moved into xₖ ± r (the play operator of Krasnosel'skii
-and Pokrovskii 1989, doi 10.1007/978-3-642-61302-9). The lag starts at the first reading, and play without load.
+A lag of n readings gives yₖ = xₖ + c (yₖ₋₁ − xₖ) with c = exp(−1/n), from the first reading on, n being τ/Δt for one in
+seconds; a steady change is read c/(1 − c) readings late. Play of half a width r gives yₖ₋₁, moved into xₖ ± r, from
+zero on (the play operator of Krasnosel'skii and Pokrovskii 1989, doi 10.1007/978-3-642-61302-9).
 """
 
 from __future__ import annotations
@@ -21,10 +20,9 @@ _NO_TIME = 1e-300  # [s]
 
 
 def remembered(loads: Floats, memory: Iterable[Any], times: Floats | None = None) -> Floats:
-    """Return loads, shape (..., samples, 3), as a sensor with memory reads them: lag, then play.
-
-    A memory is a lag in readings, one in seconds, and a play, as a share of the largest load of each channel, which
-    broadcast against loads, and are the same for all samples, whose times [s] have the shape (samples,).
+    """Return loads, shape (..., samples, 3), as a sensor with memory reads them: lag, then play. A memory is a lag in
+    readings, one in seconds, and a play, as a share of the largest load of each channel, which broadcast against loads,
+    and are the same for all samples, whose times [s] have the shape (samples,).
     """
     lag, lag_seconds, play = memory
     if np.any(lag_seconds):

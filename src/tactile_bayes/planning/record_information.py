@@ -14,8 +14,8 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.discrepancy import Discrepancy
+from tactile_bayes.load_cell.lone_samples import wandering_deviation
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.record import CHANNELS
 

@@ -13,7 +13,7 @@ from tactile_bayes.mechanics.rods.along import Along, text_along
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attribute_names import misspelt
 from tactile_bayes.record.parsing import number_in
-from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, SIGNED, UNITS, Frame
 from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
 
@@ -24,7 +24,6 @@ _SHAPE = (
 )
 # Points at which properties along rods are compared, and the difference over the largest value that counts as zero.
 _POINTS, _SAME = 101, 1e-9
-_SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_curve_", "_offset", "_backlash")
 
 
 def rod_attributes(rod: Rod) -> dict[str, Any]:
@@ -147,7 +146,7 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
         plain = value.item() if isinstance(value, np.generic | np.ndarray) and value.size == 1 else value
         if name in ATTRIBUTE_UNITS:
             plain = _quantity(name, plain, source)
-            signed = any(word in name for word in _SIGNED)
+            signed = name.removeprefix("load_cell_").startswith(SIGNED)
             if not (math.isfinite(plain) and (signed or plain >= 0)):
                 what = "a finite number" if signed else "zero or a positive number"
                 raise source.attribute_error(name, f"is {plain!r}: give {what}")

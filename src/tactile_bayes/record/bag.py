@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.record.bag_messages import Field, Topic, example, messages_of, opened_bag
+from tactile_bayes.errors import RecordError
 from tactile_bayes.record.origin import origins_of
 from tactile_bayes.record.quantity import converted, same_quantity
 from tactile_bayes.record.schema import CHANNELS, MEASURED
@@ -26,6 +28,7 @@ _ROUNDING = 1e-6  # relative excess of the range of an angle over a turn, in whi
 _MOST_NAMED = 5  # largest number of names of joints in a message
 # Largest difference between the delays of two topics, from header to reception, if their clocks are the same [ns].
 _DELAY = 10 * 10**9
+_LONGEST = 64  # largest number of elements of an array that are columns
 
 
 def is_bag(path: Path) -> bool:
@@ -34,15 +37,9 @@ def is_bag(path: Path) -> bool:
 
 
 def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read the fields of messages that a record needs, one sample for each message with the first load.
-
-    Drive angle and base are interpolated linearly to its time, an angle after its jumps by a turn are undone; other
-    loads are those of the nearest message, and everything else is that of the last one. A sample is left out if another
-    column has no values around it, or pauses there for more than five times its usual interval. The column "time" is
-    that since the first sample [s].
-
-    Times are those of headers, or all those of reception if headers of a topic go back, state one time for different
-    values, or have another clock than other topics. A message that is in the bag again counts once.
+    """Read the fields of messages that a record needs, one sample for each message with the first load, whose time is
+    "time" [s]; by headers, or by reception if their times cannot be right. Fields are interpolated (angle and base),
+    nearest (loads) or last; samples in a pause of another field are left out, and repeated messages count once.
     """
     source = Source(str(path))
     with opened_bag(path, source) as reader:
@@ -51,7 +48,10 @@ def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
         if not wanted:
             what = f"no column is of one of its topics: write columns like drive_angle={example(reader)}; the bag has "
             raise source.error(what + (", ".join(sorted(names)) or "no topics"))
-        topics = messages_of(reader, wanted)
+        topics = {topic: Topic() for topic in wanted}
+        connections = [connection for connection in reader.connections if connection.topic in wanted]
+        for connection, received, raw in reader.messages(connections):
+            topics[connection.topic].add(reader.deserialize(raw, connection.msgtype), received, connection.id)
     asked = _asked(topics, columns, source)
     faults = []
     for by_header in (True, False):
@@ -168,10 +168,18 @@ def _times(topics: Mapping[str, Topic], by_header: bool) -> dict[str, Index]:
 
 def _table(topics: Mapping[str, Topic], times: Mapping[str, Index], asked: list[_Column], source: Source) -> Table:
     """Return the table of the columns that were asked for, and of all other fields of their topics."""
-    main = asked[0]
+    main, taken = asked[0], {column.name for column in asked}
+    # All other fields that every message has, elements by their numbers if these stand for the same.
+    further = [
+        _Column(topic, name, field, (), None)
+        for topic, found in topics.items()
+        for name, field in found.fields.items()
+        if f"{topic}.{name}" not in taken and not field.is_named
+        if len(field.labels) == 1 and len(field.messages) == len(found.received)
+    ]
     at, _ = main.series(times[main.topic])
     cells, known = {}, np.ones(at.size, dtype=bool)
-    for column in (*asked, *_further(topics, asked)):
+    for column in (*asked, *further):
         own, values = column.series(times[column.topic])
         if column.topic == main.topic and np.array_equal(own, at):
             cells[column.name] = values
@@ -184,17 +192,6 @@ def _table(topics: Mapping[str, Topic], times: Mapping[str, Index], asked: list[
     table: dict[str, Cells] = {name: (values[known], {}) for name, values in cells.items()}
     table["time"] = (at[known] - at[known][:1]) / 1e9, {"units": "s"}
     return Table(table, {}, Source(source.name, names=list(table)))
-
-
-def _further(topics: Mapping[str, Topic], asked: Iterable[_Column]) -> list[_Column]:
-    """Return all other fields that every message has, elements by their numbers if these stand for the same."""
-    taken = {column.name for column in asked}
-    return [
-        _Column(topic, name, field, (), None)
-        for topic, found in topics.items()
-        for name, field in found.fields.items()
-        if f"{topic}.{name}" not in taken and not field.is_named and len(field.labels) == 1 and found.is_in_all(name)
-    ]
 
 
 def _usual(times: Index) -> Flags:
@@ -230,3 +227,97 @@ def _at(times: Index, values: NDArray[Any], at: Index, column: _Column) -> NDArr
     if not set(column.targets).isdisjoint(CHANNELS):
         return np.asarray(values[np.where(at - times[last] <= times[following] - at, last, following)])
     return np.asarray(values[last])
+
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+
+
+# ---- messages
+
+
+@dataclass(frozen=True)
+class Field:
+    """Values of a field in the order of reception."""
+
+    is_named: bool  # whether it is called by a label, not a number
+    messages: list[int] = field(default_factory=list)  # numbers of those that have it
+    values: list[Any] = field(default_factory=list)
+    labels: set[str | None] = field(default_factory=set)  # names that messages state for it, as of a joint
+
+
+@dataclass(frozen=True)
+class Topic:
+    """Messages of a topic in the order of reception."""
+
+    received: list[int] = field(default_factory=list)  # times of reception [ns]
+    stamps: list[int] = field(default_factory=list)  # times of headers [ns], 0 where there is none
+    publishers: list[int] = field(default_factory=list)
+    fields: dict[str, Field] = field(default_factory=dict)
+
+    def add(self, message: Any, received: int, publisher: int) -> None:
+        """Add a message."""
+        number = len(self.received)
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        self.received.append(received)
+        self.stamps.append(0 if stamp is None else stamp.sec * 10**9 + stamp.nanosec)
+        self.publishers.append(publisher)
+        for name, value, label, is_named in _fields(message):
+            one = self.fields.setdefault(name, Field(is_named))
+            one.messages.append(number)
+            one.values.append(value)
+            one.labels.add(label)
+
+
+@contextmanager
+def opened_bag(path: Path, source: Source) -> Iterator[AnyReader]:
+    """Open a bag; any failure is raised as an error of the source."""
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        what = "bags are read by the package rosbags, which is not installed: pip install 'tactile-bayes[ros]'"
+        raise source.error(what) from error
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
+            yield reader
+    except RecordError:
+        raise
+    except Exception as error:  # a damaged bag causes many kinds of errors
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise source.error(f"the bag cannot be read, it is damaged, or no bag of ROS ({what})") from error
+
+
+def example(reader: AnyReader) -> str:
+    """Return the name of a number in the bag."""
+    for connection, _, raw in reader.messages():
+        for name, value, *_ in _fields(reader.deserialize(raw, connection.msgtype)):
+            if isinstance(value, float | np.floating):
+                return f"{connection.topic}.{name}"
+    return "/topic.field"
+
+
+def _fields(
+    message: Any, lead: str = "", labels: Sequence[str] = (), label: str | None = None, is_named: bool = False
+) -> Iterator[tuple[str, Any, str | None, bool]]:
+    """Yield numbers and texts of a message: name, value, label of the element, and whether the name has the label:
+    elements of an array have numbers, and labels if a list of texts of that length is beside or above it.
+    """
+    if isinstance(message, bool | int | float | str | np.generic):
+        yield lead.rstrip("."), message, label, is_named
+    elif isinstance(message, np.ndarray | list | tuple):
+        unique = labels if len(labels) == len(message) == len(set(labels)) and not _is_texts(message) else ()
+        for index, element in enumerate(message[:_LONGEST]):
+            of_element = unique[index] if unique else label
+            yield from _fields(element, f"{lead}{index}.", label=of_element, is_named=is_named)
+            if unique and of_element and not of_element.isdigit():
+                yield from _fields(element, f"{lead}{of_element}.", label=of_element, is_named=True)
+    elif hasattr(message, "__dataclass_fields__"):
+        parts = {name: getattr(message, name) for name in message.__dataclass_fields__ if not name.startswith("__")}
+        own = next((part for part in parts.values() if _is_texts(part)), labels)
+        for name, part in parts.items():
+            yield from _fields(part, f"{lead}{name}.", own, label, is_named)
+
+
+def _is_texts(part: Any) -> bool:
+    return isinstance(part, list | tuple | np.ndarray) and len(part) > 0 and all(isinstance(one, str) for one in part)

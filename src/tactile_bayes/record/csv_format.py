@@ -13,17 +13,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.csv_end import without_cut_row
-from tactile_bayes.record.csv_header import (
-    KINDS,
-    Header,
-    cells_in,
-    column_line,
-    header_line,
-    lines_below,
-    read_header,
-)
-from tactile_bayes.record.csv_rows import Layout, read_rows
+from tactile_bayes.record.csv_header import KINDS, Header, cells_in, column_line, header_line, lines_below, read_header
+from tactile_bayes.record.csv_rows import Layout, read_rows, without_cut_row
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of
 from tactile_bayes.record.parsing import number_with_comma
@@ -105,7 +96,10 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     text, note = without_cut_row(text, header, last)
     values, lines = read_rows(text, layout, Source(called))
     for name, place in unnamed.items():
-        _refuse_content(values.pop(name), place, lines, header.line, source)
+        texts = values.pop(name)
+        for sample in np.flatnonzero(texts != "").tolist():
+            if texts[sample].strip():
+                raise source.line_error(header.line, _without_name(place, lines[sample], str(texts[sample])))
     attrs = {
         name: {key: word for key, word in header.descriptions.get(name, {}).items() if key != "kind"} for name in values
     }
@@ -149,13 +143,6 @@ def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Map
         raise source.line_error(header.line, what)
 
 
-def _refuse_content(texts: NDArray[Any], place: int, lines: NDArray[np.int64], head: int, source: Source) -> None:
-    """Refuse a column without a name that is not empty."""
-    for sample in np.flatnonzero(texts != "").tolist():
-        if texts[sample].strip():
-            raise source.line_error(head, _without_name(place, lines[sample], str(texts[sample])))
-
-
 def _without_name(place: int, line: int, text: str) -> str:
     return f"column {place} has no name: name it, or remove it (in line {line} it has {text!r})"
 
@@ -169,9 +156,8 @@ def _with_usual_line_ends(file: BinaryIO) -> BinaryIO:
 
 
 def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], source: Source) -> dict[str, str]:
-    """Read the units of columns if the line below their names is a row of units; the file is then positioned after it.
-
-    There a measured column has a unit other than 1 and -, which may be readings, and no cell is a number.
+    """Read the units of columns if the line below their names is a row of units, after which the file then is: a
+    measured column has a unit other than 1 and -, which may be readings, and no cell is a number.
     """
     cells = cells_in(next(iter(lines_below(file)), ""), header.delimiter)
     texts = [_without_brackets(cell) for cell in cells]

@@ -107,7 +107,9 @@ def read_header(file: BinaryIO, source: Source) -> Header:
                 names = list(map(visible, cells_in(line, delimiter)))
                 if not names[0] and "index" not in names and _counted(below, delimiter):
                     names[0] = "index"  # which pandas writes without a name
-                _refuse_equal(names, number, source)
+                if twice := [name for name in names if name and names.count(name) > 1]:
+                    what = f"there are two columns {twice[0]!r}: rename or remove one of them"
+                    raise source.line_error(number, what)
                 heads = dict.fromkeys(names, number) | heads
                 lines = {name: line for name, (line, _) in stated.items()}
                 _refuse_stray(remarks, lines, source)
@@ -245,9 +247,3 @@ def _counted(lines: Sequence[str], delimiter: str) -> bool:
     """Return whether the first cells of lines are 0, 1, 2, ..."""
     first = [cells_in(line, delimiter)[0] for line in lines if line.strip()]
     return bool(first) and first == list(map(str, range(len(first))))
-
-
-def _refuse_equal(names: list[str], number: int, source: Source) -> None:
-    for column in filter(None, names):
-        if names.count(column) > 1:
-            raise source.line_error(number, f"there are two columns {column!r}: rename or remove one of them")

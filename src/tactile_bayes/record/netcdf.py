@@ -41,10 +41,8 @@ def write_netcdf(
     path: str | os.PathLike[str],
     encoding: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
-    """Write a dataset or a tree to a NetCDF 4 file atomically, with checksums.
-
-    Arrays have those of HDF5. Attributes, scalars and the structure of a file cannot; so the last line, beyond the end
-    that HDF5 knows, is the SHA-256 of all bytes before it. Programs that modify the file drop that line.
+    """Write a dataset or a tree to a NetCDF 4 file atomically, with checksums: those of HDF5 in arrays, and in a last
+    line, beyond the end that HDF5 knows, the SHA-256 of all bytes before it, which programs that modify the file drop.
     """
     image = _image_of(content, encoding or {})
     with write_atomically(path) as temporary, open(temporary, "wb") as file:
@@ -83,10 +81,8 @@ def read_netcdf(
     sha256: str | None = None,
     **options: Any,
 ) -> Content:
-    """Read a NetCDF 4 file into memory, by `xarray.open_dataset` or `open_datatree`, or raise `refused(what)`.
-
-    Damage may cause HDF5 to crash, to hang, or to take all memory. So a file is verified first if its SHA-256 is known,
-    and else read by a process of its own, with a limit of time and memory, which takes half a second longer.
+    """Read a NetCDF 4 file into memory, by `xarray.open_dataset` or `open_datatree`, or raise `refused(what)`. Damage
+    may make HDF5 crash, hang, or take all memory: a file without a checksum is read by a process with limits.
     """
     content = path.read_bytes()
     if sha256 is not None:
@@ -111,9 +107,8 @@ def _dataset(group: FileGroup, options: Mapping[str, Any]) -> xr.Dataset:
 
 
 def _content_elsewhere(content: bytes, with_groups: bool) -> dict[str, FileGroup]:
-    """Return what `content_of` returns, or raise what it raises, from a process with limits of time and memory.
-
-    It runs a script: unlike multiprocessing, that needs no `__main__` to import, and a worker may start it.
+    """Return what `content_of` returns, or raise what it raises, from a process with limits of time and memory: a
+    script, since multiprocessing needs a `__main__` to import, and no worker may start it.
     """
     if is_cut_short(content):
         raise ValueError("it is no HDF5, or has fewer bytes than it states")

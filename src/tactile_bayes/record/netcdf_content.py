@@ -1,6 +1,5 @@
-"""The content of a NetCDF 4 file; run as a script, that of one whose origin is unknown, within limits.
-
-It imports nothing of this package, so that the script starts in a quarter of a second.
+"""The content of a NetCDF 4 file; run as a script, that of one whose origin is unknown, within limits. It imports
+nothing of this package, so that the script starts in a quarter of a second.
 """
 
 from __future__ import annotations

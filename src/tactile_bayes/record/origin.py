@@ -15,14 +15,7 @@ import xarray as xr
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.quantity import (
-    OTHER_UNITS,
-    accepted_units,
-    converted,
-    same_quantity,
-    unit_of,
-    units_disagree,
-)
+from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, converted, same_quantity, unit_of, units_disagree
 from tactile_bayes.record.schema import DIRECTIONS, MEASURED, Column, Kind, column_of
 from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
@@ -69,9 +62,8 @@ class Origin:
 
 
 def column_entry(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, digits: int = 3) -> str:
-    """Return the source that reads a column of a record as sense · (its values) + added, rounded to digits.
-
-    "" if its origin does not have the unit of the record, as after a conversion by the rod.
+    """Return the source that reads a column of a record as sense · (its values) + added, rounded to digits; "" if its
+    origin does not have the unit of the record, as after a conversion by the rod.
     """
     name, unit = str(column.name), str(column.attrs.get("units", "1"))
     stored = column.encoding.get(ORIGIN) or column.attrs.get(ORIGIN)

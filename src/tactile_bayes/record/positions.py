@@ -16,9 +16,8 @@ _DRIFT, _ONE_SIDED, _CREEP = 0.3, 0.5, 0.03
 
 def positions_of(travel: Floats) -> Index:
     """Return the position, counted from 0, at which each sample of a sweep was read; one a sample if none is shared.
-
-    Differences of neighbours are divided where two successive ones, by size, are furthest apart in ratio, if the larger
-    ones may be steps in the sense of the drive, and the smaller ones noise.
+    Differences of neighbours are divided where two successive sizes are furthest apart in ratio, if the larger ones may
+    be steps of the drive, and the smaller ones noise.
     """
     steps = np.diff(travel) * (1.0 if travel[-1] >= travel[0] else -1.0)
     sizes = np.sort(np.abs(steps))

@@ -87,9 +87,8 @@ class Unit:
 
 @functools.cache
 def unit_of(text: str) -> Unit | None:
-    """Parse a unit, or return None. N m², N·m^2, N*m2, N-m² and Nm² are the same one.
-
-    Without a separator a prefix has precedence over a product: mN is a millinewton, and m N a newton metre.
+    """Parse a unit, or return None. N m², N·m^2, N*m2, N-m² and Nm² are the same one; without a separator a prefix has
+    precedence over a product: mN is a millinewton, and m N a newton metre.
     """
     if len(text) > _LONGEST:
         return None

@@ -112,6 +112,8 @@ LOAD_CELL_UNITS: Mapping[str, str] = {
     "drive_angle_noise": "rad",
     "drive_angle_resolution": "rad",
 }
+# Beginnings of the names of those that may be negative.
+SIGNED = ("bias_h", "bias_f", "gain_", "correlation_", "lever_", "moment_curve_", "drive_angle_o", "drive_angle_b")
 # Attributes that are quantities, with their units in an SI record.
 ATTRIBUTE_UNITS: Mapping[str, str] = {
     "rod_length": "m",

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,8 @@ from tactile_bayes.record.table import Source
 
 
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
-    """Refuse sweeps with several directions or two pivots, or with a drive angle in degrees or against the direction.
-
-    From three places of the base on, or if the drive angle does not move, the drive carries the base.
+    """Refuse sweeps with several directions or two pivots, or with a drive angle in degrees or against the direction;
+    from three places of the base on, or if the drive angle does not move, the drive carries the base.
     """
     direction, angle = values["direction"], values["drive_angle"]
     forward = direction == "forward"
@@ -34,15 +32,15 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
         raise source.cell_error(beyond, "drive_angle", _beyond_a_turn(angle, beyond[0], source))
     plain = _are_plain(values, forward)
     for rows in _sweeps(values["sweep"]):
-        first, last = _ends(rows)
-        if isinstance(rows, slice) and plain[first:last].all():
+        first, last = int(rows[0]), int(rows[-1])
+        if last - first == rows.size - 1 and plain[first:last].all():
             continue
         sweep = int(values["sweep"][first])
         carried = _is_carried(values["base_x"][rows], values["base_y"][rows], angle[rows])
         for name in ("direction",) if carried else ("direction", "base_x", "base_y"):
             differs = values[name][rows] != values[name][first]
             if differs.any():
-                other = first + int(np.argmax(differs)) if isinstance(rows, slice) else int(rows[np.argmax(differs)])
+                other = int(rows[np.argmax(differs)])
                 one, two = values[name][first].item(), values[name][other].item()
                 part = "motion of the drive" if name == "direction" else "position of the pivot"
                 raise source.error(
@@ -102,7 +100,7 @@ def carried_sweeps(record: xr.Dataset) -> tuple[int, ...]:
     sweep = record.sweep.values
     if all((values == values[0]).all() for values in columns[:2]):
         return ()
-    found = {int(sweep[_ends(rows)[0]]): _is_carried(*(values[rows] for values in columns)) for rows in _sweeps(sweep)}
+    found = {int(sweep[rows[0]]): _is_carried(*(values[rows] for values in columns)) for rows in _sweeps(sweep)}
     return tuple(number for number, carried in found.items() if carried)
 
 
@@ -153,20 +151,9 @@ def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
     return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
-def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | Index]:
-    """Yield the rows of each sweep in the order of measurement, as slices if sweeps are contiguous."""
-    steps = np.flatnonzero(sweep[1:] != sweep[:-1]) + 1
-    numbers = sweep[np.concatenate(([0], steps))]
-    if np.unique(numbers).size == numbers.size:
-        ends = [0, *steps.tolist(), sweep.size]
-        yield from (slice(begin, end) for begin, end in pairwise(ends))
-    else:
-        yield from rows_of_sweeps(sweep)
-
-
-def _ends(rows: slice | Index) -> tuple[int, int]:
-    """Return the first and the last row of a sweep."""
-    return (rows.start, rows.stop - 1) if isinstance(rows, slice) else (int(rows[0]), int(rows[-1]))
+def _sweeps(sweep: NDArray[np.int64]) -> list[Index]:
+    """Return the rows of each sweep, in the order in which sweeps begin."""
+    return sorted(rows_of_sweeps(sweep), key=lambda rows: int(rows[0]))
 
 
 def _runs_backwards(angle: Floats, sense: int) -> bool:

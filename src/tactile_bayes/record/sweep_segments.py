@@ -38,11 +38,9 @@ def turning_points(angle: Floats, least: float) -> list[int]:
 
 
 def split_at_turns(table: Table, length: float = 1.0) -> Table:
-    """Add sweeps and directions to a table, from its drive angle, or from the motion of its base; see `FileFormat`.
-
-    If the base moves in more than half of the steps, the drive carries it. A sweep then ends where the base turns back
-    on the line along which it moves most, and it is forward if the middle of the unloaded rod, of this length [length],
-    moves to its left on average. In a record of both kinds each stretch is split in its own way.
+    """Add sweeps and directions to a table, from its drive angle, or from the motion of its base; see `FileFormat`. A
+    base that is carried turns back on the line along which it moves most; a sweep is forward if the middle of the
+    unloaded rod, of this length [length], moves to its left on average.
     """
     source = table.source
     table.refuse_empty()
@@ -51,25 +49,19 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
     if "drive_angle" in table.columns:  # else refused later, with the others that are missing
         angle = _finite("drive_angle", table)
         at_origin = np.zeros(angle.size)
-        base = [_finite(name, table) if name in table.columns else at_origin for name in ("base_x", "base_y")]
-        sweeps = _sweeps_in(angle, np.stack(base, axis=1), length, source)
+        xy = [_finite(name, table) if name in table.columns else at_origin for name in ("base_x", "base_y")]
+        base, sweeps = np.stack(xy, axis=1), []
+        moved = np.append(False, np.any(base[1:] != base[:-1], axis=1))
+        _refuse_wrapped(angle, moved, source)
+        for stretch, is_carried in _stretches(angle, moved):
+            if is_carried:
+                sweeps += _carried_sweeps(stretch, angle, base, length, source)
+            else:
+                sweeps += _turned_sweeps(stretch, angle, moved, source)
     sizes = [end - begin for begin, end, _ in sweeps]
     sweep = np.repeat(np.arange(len(sweeps)), sizes)
     direction = np.where(np.repeat([is_forward for *_, is_forward in sweeps], sizes), "forward", "backward")
     return replace(table, columns={**table.columns, "sweep": (sweep, {}), "direction": (direction, {})})
-
-
-def _sweeps_in(angle: Floats, base: Floats, length: float, source: Source) -> list[tuple[int, int, bool]]:
-    """Return begin and end of each sweep, and whether it is forward."""
-    moved = np.append(False, np.any(base[1:] != base[:-1], axis=1))
-    _refuse_wrapped(angle, moved, source)
-    sweeps: list[tuple[int, int, bool]] = []
-    for stretch, is_carried in _stretches(angle, moved):
-        if is_carried:
-            sweeps += _carried_sweeps(stretch, angle, base, length, source)
-        else:
-            sweeps += _turned_sweeps(stretch, angle, moved, source)
-    return sweeps
 
 
 def each_row(table: Table) -> Table:
@@ -97,9 +89,8 @@ def _finite(name: str, table: Table) -> Floats:
 
 
 def _stretches(angle: Floats, moved: Flags) -> list[tuple[slice, bool]]:
-    """Return stretches of samples in their order, each with whether the base is carried in it.
-
-    A base that rests while the drive turns is a pivot. `moved` is True where the base is not where it was before.
+    """Return stretches of samples in their order, each with whether the base is carried in it: a base that rests while
+    the drive turns is a pivot. `moved` is True where the base is not where it was before.
     """
     turns = np.zeros(angle.size, dtype=bool)
     for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):

@@ -15,8 +15,7 @@ _ELSE = "give the lag in readings (lag) in place of seconds (lag_seconds)"
 
 
 def times_of(record: xr.Dataset) -> Floats:
-    """Return the times of the samples [s], from the further column of numbers in a unit of time; refuse without one.
-
+    """Return the times of the samples [s], from the further column of numbers in a unit of time, refuse without one.
     The unit is an attribute, or in the name, as in "time [ms]" or time_s. Of several columns that of "time" is taken.
     """
     found: dict[str, Floats] = {}

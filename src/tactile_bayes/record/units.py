@@ -43,9 +43,8 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
 
 
 def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
-    """Convert a record and its load cell to the units of the rod: lengths L, moments EI/L, forces EI/L².
-
-    Equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945. Columns that the schema does not know are kept.
+    """Convert a record and its load cell to the units of the rod: lengths L, moments EI/L, forces EI/L² (equation 11 of
+    Merker et al. 2018, doi 10.1155/2018/1613945). Columns that the schema does not know are kept.
     """
     if record.attrs.get("units") == "dimensionless":
         return record

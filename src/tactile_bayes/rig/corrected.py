@@ -19,9 +19,9 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import CHANNELS, base_of_sample, frame_of, present_channels, rod_of, to_si, with_rod
 from tactile_bayes.record.attributes import without_rod
-from tactile_bayes.record.construction import completed_record, table_of_columns
 from tactile_bayes.record.schema import column_of
 from tactile_bayes.record.times import times_of
+from tactile_bayes.record.validation import completed_record, table_of_columns
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.stated import cell_with, rod_with
 from tactile_bayes.rig.unknown import pivot_shifts

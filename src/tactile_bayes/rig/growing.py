@@ -44,35 +44,9 @@ class Growth(NamedTuple):
 
 
 class GrowingRecord:
-    """A record in a CSV file to which another program appends rows; it may not be there yet.
-
-    A last line without an end is left until it has one. Rows with which there would be no record (cells that cannot be
-    read, NaN, too many cells) are left out, and so are samples behind the others of their sweep: of a sweep that was
+    """A record in a CSV file to which another program appends rows; it may not be there yet. A last line without an end
+    is left until it has one. Left out are rows with which there would be no record, and samples of a sweep that was
     over, or at a drive angle further behind than the encoder scatters, unless the base is carried.
-
-    Parameters
-    ----------
-    path : path-like
-        A file with suffix .csv.
-    rig : Rig, optional
-        As in `read_record`. Where it finds sweeps by the turns of the drive, those of former samples may change.
-
-    Raises
-    ------
-    RecordError
-        If the path has another suffix, or is a folder.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> with tempfile.TemporaryDirectory() as directory:
-    ...     path = Path(directory) / "record.csv"
-    ...     growing = GrowingRecord(path, Rig(file={"missing": ["force_x", "force_y"]}))
-    ...     _ = path.write_text("sweep,direction,drive_angle,holding_moment\\n0,forward,1.2,0.1\\n0,forw")
-    ...     now = growing.poll()
-    ...     print(now.record.sizes["sample"], growing.poll())
-    1 None
     """
 
     def __init__(self, path: str | os.PathLike[str], rig: Rig | None = None) -> None:
@@ -168,9 +142,8 @@ def _with_others(words: str, lines: list[int]) -> str:
 
 
 def _behind(record: xr.Dataset) -> list[int]:
-    """Return the samples that are behind others of their sweep, or in a sweep that was over, by those before them.
-
-    One or two samples of another sweep within a sweep are taken to have a wrong number.
+    """Return the samples that are behind others of their sweep, or in a sweep that was over, by those before them. One
+    or two samples of another sweep within a sweep are taken to have a wrong number.
     """
     carried = carried_sweeps(record)
     noise = float(record.attrs.get("load_cell_drive_angle_noise", 0.0))

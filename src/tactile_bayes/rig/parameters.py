@@ -1,12 +1,12 @@
-"""The parameters of a rig: how far the rig on the table may be from what its data sheets state.
-
-One table: names, meanings, units, bounds, default distributions, and when a record cannot show them.
+"""The parameters of a rig: how far the rig on the table may be from what its data sheets state. One table: names,
+meanings, units, bounds, default distributions, and when a record cannot show them.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,11 +20,21 @@ _DEGREE = float(np.radians(1.0))
 _CHANNELS = ("moment", "force_x", "force_y")
 
 
-class Parameter(NamedTuple):
-    """A parameter of a rig.
+# Powers of the units of moments, EI/L, or of forces, EI/L², and of lengths, in SI units.
+_POWERS = {
+    "N m": (1, 0),
+    "N": (1, 0),
+    "m": (0, 1),
+    "1/m": (0, -1),
+    "m/N": (-1, 2),
+    "1/N/m": (-1, 0),
+    "1/N²/m²": (-2, 0),
+    "rad/(N m)": (-1, 0),
+}
 
-    Units are products of powers: of the unit of moments, EI/L (of forces, EI/L², in zeros of forces), and of lengths.
-    """
+
+class Parameter(NamedTuple):
+    """A parameter of a rig."""
 
     name: str
     meaning: str
@@ -38,9 +48,12 @@ class Parameter(NamedTuple):
     neutral: float | None = 0.0  # value of a rig that is as stated; None if the rod or the load cell states it
     low: float = -np.inf
     high: float = np.inf
-    of_moment: int = 0  # power of the unit of moments
-    of_length: int = 0  # power of the unit of lengths
     hidden: str = ""  # when no record shows it, or which one does not
+
+    @property
+    def powers(self) -> tuple[int, int]:
+        """Powers of the unit of moments (of forces in zeros of forces), and of that of lengths, in the unit."""
+        return _POWERS.get(self.unit, (0, 0))
 
 
 # Which records do not show some of them.
@@ -62,7 +75,7 @@ def _of_channels(what: str, meaning: str) -> Iterator[Parameter]:
     """Yield a change of the zero of each channel, in tenths of its unit."""
     for channel in _CHANNELS:
         unit = "N m" if channel == "moment" else "N"
-        yield Parameter(f"{channel}_{what}", meaning.format(channel), unit, "normal", 0.1, of_moment=1)
+        yield Parameter(f"{channel}_{what}", meaning.format(channel), unit, "normal", 0.1)
 
 
 def _memory(what: str, meaning: str, unit: str, width: float) -> Iterator[Parameter]:
@@ -71,25 +84,16 @@ def _memory(what: str, meaning: str, unit: str, width: float) -> Iterator[Parame
         yield Parameter(f"{prefix}{what}", meaning.format(of), unit, "half_normal", width, None, 0.0)
 
 
+_not_negative = partial(Parameter, low=0.0)
 _ROWS = (
-    Parameter(
-        "rigidity_scale",
-        "flexural rigidity over the stated one",
-        "1",
-        "log_normal",
-        0.05,
-        1.0,
-        0.0,
-        hidden=_BESIDE_GAINS,
+    _not_negative(
+        "rigidity_scale", "flexural rigidity over the stated one", "1", "log_normal", 0.05, 1.0, hidden=_BESIDE_GAINS
     ),
     Parameter(
         "drive_angle_offset", "reading of the encoder less the angle", "rad", "normal", _DEGREE, 0.0, -np.pi, np.pi
     ),
     *_of_channels("bias", "reading of {} without load, in the middle of the record"),
-    *(
-        Parameter(f"lever_{axis}", f"{axis} {_LEVER}", "m", "normal", 0.005, of_length=1, hidden=_NO_MOMENT)
-        for axis in "xy"
-    ),
+    *(Parameter(f"lever_{axis}", f"{axis} {_LEVER}", "m", "normal", 0.005, hidden=_NO_MOMENT) for axis in "xy"),
     Parameter(
         "backlash",
         "reading of the encoder in forward motion less that in backward motion",
@@ -109,51 +113,22 @@ _ROWS = (
         Parameter(f"{channel}_gain", f"reading of {channel} over the load", "1", "normal", 0.02, 1.0, 0.0)
         for channel in _CHANNELS
     ),
-    Parameter(
-        "moment_curve_quadratic",
-        "curve of the moment's reading",
-        "1/N/m",
-        "normal",
-        0.05,
-        None,
-        of_moment=-1,
-        hidden=_NO_MOMENT,
-    ),
-    Parameter(
-        "moment_curve_cubic",
-        "curve of the moment's reading",
-        "1/N²/m²",
-        "normal",
-        0.02,
-        None,
-        of_moment=-2,
-        hidden=_NO_MOMENT,
+    *(
+        Parameter(
+            f"moment_curve_{what}", "curve of the moment's reading", unit, "normal", width, None, hidden=_NO_MOMENT
+        )
+        for what, unit, width in (("quadratic", "1/N/m", 0.05), ("cubic", "1/N²/m²", 0.02))
     ),
     *_memory("lag", "lag of first order of {}, in readings", "1", 1.0),
     *_memory("lag_seconds", "lag of first order of {}, where the record has times", "s", 0.2),
     *_memory("play", "hysteresis of {}: half the loop's width over the largest load", "1", 0.01),
-    Parameter(
-        "suspension_compliance",
-        "turn of the pivot per holding moment",
-        "rad/(N m)",
-        "half_normal",
-        0.05,
-        0.0,
-        0.0,
-        of_moment=-1,
+    _not_negative(
+        "suspension_compliance", "turn of the pivot per holding moment", "rad/(N m)", "half_normal", 0.05, 0.0
     ),
-    Parameter(
-        "contact_compliance",
-        "way of the object along its normal per normal force",
-        "m/N",
-        "half_normal",
-        0.003,
-        0.0,
-        0.0,
-        of_moment=-1,
-        of_length=2,
+    _not_negative(
+        "contact_compliance", "way of the object along its normal per normal force", "m/N", "half_normal", 0.003, 0.0
     ),
-    Parameter("rest_curvature", "mean curvature of the unloaded rod", "1/m", "normal", 0.05, None, of_length=-1),
+    Parameter("rest_curvature", "mean curvature of the unloaded rod", "1/m", "normal", 0.05, None),
     *(
         Parameter(f"rest_shape_{k}", f"amplitude of mode {k} {_SHAPE}", "1", "normal", 1.0, hidden=_UNTRACED)
         for k in range(1, MOST_MODES + 1)
@@ -162,73 +137,36 @@ _ROWS = (
         "taper_error", "error of the measured taper, in its standard deviations", "1", "normal", 1.0, hidden=_UNMEASURED
     ),
     Parameter("taper", "part by which the diameter falls to the tip", "1", "normal", 0.05, None, 0.0, STEEPEST_TAPER),
-    Parameter(
-        "stem",
-        "rigid, straight piece between pivot and rod",
-        "m",
-        "normal",
-        0.02,
-        None,
-        0.0,
-        of_length=1,
-        hidden=_BESIDE_LEVER,
+    _not_negative(
+        "stem", "rigid, straight piece between pivot and rod", "m", "normal", 0.02, None, hidden=_BESIDE_LEVER
     ),
-    Parameter("length", "length of the rod", "m", "normal", 0.01, None, 0.0, of_length=1),
+    Parameter("length", "length of the rod", "m", "normal", 0.01, None, 0.0),
     *(
-        Parameter(
-            f"gauge_{a}", f"{a} of the gauge less the stated one", "m", "normal", 0.01, of_length=1, hidden=_NO_GAUGE
-        )
+        Parameter(f"gauge_{a}", f"{a} of the gauge less the stated one", "m", "normal", 0.01, hidden=_NO_GAUGE)
         for a in "xy"
     ),
-    Parameter(
+    _not_negative(
         "discrepancy_scale",
         "smooth deviation of readings in contact over the largest load of the sweep",
         "1",
         "log_normal",
         1.0,
         0.005,
-        0.0,
     ),
-    Parameter(
+    _not_negative(
         "discrepancy_length",
         "drive angle, or travel in rod lengths, over which it changes",
         "rad",
         "log_normal",
         0.5,
         0.3,
-        0.0,
     ),
-    Parameter(
-        "noise_scale",
-        "noise over the one that the load cell states",
-        "1",
-        "log_normal",
-        0.5,
-        1.0,
-        0.0,
-        hidden=_NO_NOISE,
+    _not_negative(
+        "noise_scale", "noise over the one that the load cell states", "1", "log_normal", 0.5, 1.0, hidden=_NO_NOISE
     ),
-    Parameter(
-        "moment_noise",
-        "standard deviation of the moment",
-        "N m",
-        "log_uniform",
-        1e-6,
-        None,
-        0.0,
-        of_moment=1,
-        hidden=_NOISE,
-    ),
-    Parameter(
-        "force_noise",
-        "standard deviation of each force",
-        "N",
-        "log_uniform",
-        1e-6,
-        None,
-        0.0,
-        of_moment=1,
-        hidden=_NOISE,
+    *(
+        Parameter(f"{of}_noise", f"standard deviation of {what}", unit, "log_uniform", 1e-6, None, 0.0, hidden=_NOISE)
+        for of, what, unit in (("moment", "the moment", "N m"), ("force", "each force", "N"))
     ),
 )
 
@@ -273,7 +211,7 @@ def parameter_named(name: str) -> Parameter | None:
     if shift is None:
         return PARAMETERS.get(name)
     meaning = f"{shift[2]} of pivot {shift[1]} less the recorded one"
-    return Parameter(name, meaning, "m", "normal", 0.01, of_length=1, hidden="of the first pivot")
+    return Parameter(name, meaning, "m", "normal", 0.01, hidden="of the first pivot")
 
 
 def members(name: str) -> Iterator[str]:

@@ -2,27 +2,42 @@
 
 from __future__ import annotations
 
+import operator
 import os
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
+from tactile_bayes.arrays import Flags
 from tactile_bayes.errors import RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.bag import is_bag
-from tactile_bayes.record.construction import completed_record, table_of_columns
 from tactile_bayes.record.files import read_table
-from tactile_bayes.record.origin import ORIGIN, renamed
-from tactile_bayes.record.rows import rows_where
+from tactile_bayes.record.origin import ORIGIN, found_column, renamed
+from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.spelling import nearest
 from tactile_bayes.record.sweep_segments import each_row, split_at_turns
 from tactile_bayes.record.table import Table
 from tactile_bayes.record.units import assumed_units, in_units_of_record, with_rod
+from tactile_bayes.record.validation import completed_record, table_of_columns
 from tactile_bayes.rig.rig import Rig, rig_of
+
+_COMPARISONS = {
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<=": operator.le,
+    ">=": operator.ge,
+    "<": operator.lt,
+    ">": operator.gt,
+}
+_SIGN = re.compile("|".join(_COMPARISONS))
 
 
 def read_record(path: str | os.PathLike[str], rig: Rig | None = None) -> xr.Dataset:
@@ -166,10 +181,7 @@ def _warn(record: xr.Dataset, where: str = "") -> None:
 
 
 def record_in(table: Table, rig: Rig) -> xr.Dataset:
-    """Return the record in a table as its rig wrote it.
-
-    Its encoding has "notes", what was assumed or left out, and "remarks", commented lines without a meaning.
-    """
+    """Return the record in a table as its rig wrote it, with "notes" and "remarks" of the file in its encoding."""
     columns, rod, cell = rig.format.columns, rig.rod, rig.load_cell
     shape = rod if rod is not None and rod.is_dimensionless and rod != Rod() else None
     if shape is not None:
@@ -197,3 +209,45 @@ def record_in(table: Table, rig: Rig) -> xr.Dataset:
         if ORIGIN in variable.attrs:
             variable.encoding[ORIGIN] = variable.attrs.pop(ORIGIN)
     return record
+
+
+# ---- the rows of a table that belong to a record
+
+
+def rows_where(table: Table, where: str) -> Table:
+    """Return the rows of a table that meet each of some conditions, as in `FileFormat`."""
+    if not where:
+        return table
+    table.refuse_empty()
+    met = np.ones(table.samples, dtype=bool)
+    for condition in re.split(r"\sand\s", where):
+        met &= _meets(table, condition)
+    if not met.any():
+        raise table.source.error(f"no row meets where = {where!r} in [file]: mend it, or leave it out")
+    columns = {name: (values[met], attrs) for name, (values, attrs) in table.columns.items()}
+    lines = None if table.source.lines is None else np.asarray(table.source.lines)[met]
+    return replace(table, columns=columns, source=replace(table.source, lines=lines))
+
+
+def _meets(table: Table, condition: str) -> Flags:
+    names, sign = list(table.columns), _SIGN.search(condition)
+    wanted, value = (condition[: sign.start()].strip(), condition[sign.end() :].strip()) if sign else ("", "")
+    if not (sign and wanted and value):
+        example = f"{names[0]} > 0" if names else "trial == 3"
+        raise table.source.error(
+            f"where = {condition.strip()!r} in [file] is no condition: write a column, one of "
+            f"{', '.join(_COMPARISONS)}, and a value, as in {example!r}; several are joined by 'and'"
+        )
+    name, text = found_column(wanted, names), value.strip("'\"")
+    if name is None:
+        near = nearest(wanted, names)
+        raise table.source.error(
+            f"where = {condition.strip()!r} in [file]: there is no column {wanted!r}: "
+            + (f"did you mean {near!r}?" if near else f"the columns are {', '.join(names)}")
+        )
+    values, compared = table.columns[name][0], _COMPARISONS[sign[0]]
+    try:
+        number = float(text)
+    except ValueError:
+        return np.asarray(compared(np.asarray(values).astype(str), text))
+    return np.asarray(compared(parsed_column(name, values, table.source), number))

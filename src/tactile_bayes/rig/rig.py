@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -11,24 +11,29 @@ from typing import Any, Literal, cast
 
 import xarray as xr
 
-from tactile_bayes.checks import check_kind, check_optional, check_path
+from tactile_bayes.checks import check_kind, check_optional, check_path, check_whole_number
 from tactile_bayes.distributions import Distribution, in_words, stated_text, text_or_unwritten
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.numerics.random_numbers import Rng
+from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import rod_of, validate
 from tactile_bayes.rig.corrected import measured_by
-from tactile_bayes.rig.drawn import drawn_numbers
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, STANDARD, members
-from tactile_bayes.rig.rig_file import named_in_errors, read_tables, stated_in, tables_of, text_of, write_file
+from tactile_bayes.rig.rig_file import file_of, named_in_errors, read_tables, stated_in, tables_of, text_of
 from tactile_bayes.rig.rig_prior import RigPrior
-from tactile_bayes.rig.stated import rod_with
-from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded
+from tactile_bayes.rig.stated import Stated, rod_with, within_bounds
+from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded, of_modes, of_pivots
+from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_toml
 
 _SHAPE = ("rest_curvature", "taper", "taper_error", "stem", "length", *GROUPS["rest_shape"])
+# Parameters that are not drawn, and what to do.
+_UNDRAWN = {
+    **dict.fromkeys(GROUPS["discrepancy"], "a discrepancy is a function and no number: leave it out where you draw"),
+    **dict.fromkeys(("moment_noise", "force_noise"), "state it in the load cell, and give noise_scale where it varies"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +227,21 @@ class Rig:
         >>> drawn.distributions, drawn.known["lever_x"], round(drawn.known["rigidity_scale"], 4)
         ({}, 0.0, 1.0015)
         """
-        return replace(self, unknown=drawn_numbers(self, rng, pivots), calibration=None)
+        check_whole_number("pivots", pivots, 1)
+        cell = self.load_cell or LoadCell()
+        uncertain = [name for name, size in zip(GROUPS["bias"], cell.bias_uncertainty, strict=True) if size > 0.0]
+        said = unknown_of(self, pivots, uncertain)
+        stated, random = Stated.of(self.rod or Rod(), cell), generator(rng)
+        numbers: dict[str, Unknown] = {}
+        for name, value in said.items():
+            if not isinstance(value, float):
+                distribution = stated.default(name) if isinstance(value, str) else value
+                value = float(within_bounds(name, distribution, random.random(1))[0])
+            numbers[name] = value
+        if self.calibration is not None:
+            found = self.calibration.at_shares(random.random((1, len(self.calibration.priors))))
+            numbers |= {name: float(value[0]) for name, value in found.items()}
+        return replace(self, unknown=numbers, calibration=None)
 
     def measure(self, record: xr.Dataset, *, rng: Rng) -> xr.Dataset:
         """Return the record of this rig, from `scan`, as its load cell and its encoder read it.
@@ -323,10 +342,27 @@ class Rig:
         ParameterError
             If a distribution is none of SciPy's, which text cannot state.
         """
-        write_file(self.tables, check_path("path", path, "give a file rig.toml"))
+        text = file_of(self.tables)
+        with write_atomically(check_path("path", path, "give a file rig.toml")) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def rig_of(rig: Rig | None) -> Rig:
     """Return a rig, by default one that says nothing."""
     check_optional("rig", rig, Rig, "give Rig(rod=..., load_cell=...), or Rig.read(path)")
     return rig or Rig()
+
+
+def unknown_of(rig: Rig, pivots: int, uncertain: Collection[str] = ()) -> dict[str, Unknown]:
+    """Return what is said of all parameters but calibrated ones, and biases that the load cell itself draws."""
+    found = () if rig.calibration is None else tuple(rig.calibration.priors)
+    said = of_pivots({name: value for name, value in rig.said.items() if name not in found}, pivots)
+    said = of_modes(said, rig.rod or Rod())
+    for name, value in said.items():
+        if name in _UNDRAWN and not isinstance(value, float):
+            raise ParameterError(f"{name} is unknown, and is not drawn: {_UNDRAWN[name]}")
+    hidden = {name for name in uncertain if not rig.is_named(name)}
+    drawn = {*found, *(name for name, value in said.items() if not isinstance(value, float))}
+    if drawn.issuperset(GROUPS["gain"]) and not rig.is_named("rigidity_scale"):
+        hidden.add("rigidity_scale")  # a stiffer rod and larger gains have the same effect
+    return {name: value for name, value in said.items() if name not in hidden}

@@ -27,7 +27,7 @@ from tactile_bayes.rig.file_format import OPTIONS, FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import NOTHING
-from tactile_bayes.tasks import check_format, write_atomically
+from tactile_bayes.tasks import check_format
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
 ROD_UNITS = {
@@ -82,12 +82,6 @@ def named_in_errors(path: Path) -> Iterator[None]:
         yield
     except (TactileBayesError, UnicodeDecodeError) as error:
         raise ParameterError(f"{path}: {error}") from error
-
-
-def write_file(tables: Mapping[str, Any], path: Path) -> None:
-    """Write tables to a TOML file, whole or not at all."""
-    with write_atomically(path) as temporary:
-        temporary.write_text(file_of(tables), encoding="utf-8", newline="\n")
 
 
 def file_of(tables: Mapping[str, Any]) -> str:

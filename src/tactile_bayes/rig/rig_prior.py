@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from scipy import stats
+from scipy.special import ndtri
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_positive
-from tactile_bayes.distributions import Distribution, in_words, numbers_of
+from tactile_bayes.distributions import Distribution, in_words, numbers_of, open_share
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.spelling import refuse_unknown_keys
 
@@ -22,9 +23,8 @@ _FARTHEST = 30.0  # largest normal score, beyond which densities vanish anyway
 
 @dataclass(frozen=True, eq=False)
 class RigPrior:
-    """Joint prior of parameters of a rig: marginals, joined by a normal copula.
-
-    With normal and log-normal marginals it is a multivariate normal distribution of the parameters or their logarithms.
+    """Joint prior of parameters of a rig: marginals, joined by a normal copula. With normal and log-normal marginals it
+    is a multivariate normal distribution of the parameters or their logarithms.
     """
 
     # Marginals by name: normal, log-normal, or truncated normal where a parameter may be zero but not negative.
@@ -91,6 +91,10 @@ class RigPrior:
         scores = normal @ np.linalg.cholesky(self.correlation).T
         columns = [_at_scores(prior, z) for prior, z in zip(self.priors.values(), scores.T, strict=True)]
         return np.stack(columns, axis=1)
+
+    def at_shares(self, shares: Floats) -> dict[str, Floats]:
+        """Return values of parameters, each of shape (n,), from independent shares, shape (n, parameters)."""
+        return dict(zip(self.priors, self.at(ndtri(open_share(shares))).T, strict=True))
 
     def scores(self, points: Floats) -> Floats:
         """Return the normal scores of points, shape (n, parameters)."""

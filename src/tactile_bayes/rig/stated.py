@@ -35,7 +35,8 @@ def unit_of(name: str, rod: Units) -> Any:
     parameter = parameter_named(name)
     assert parameter is not None
     load = rod.force_unit if name.startswith("force") else rod.moment_unit
-    return load**parameter.of_moment * rod.length_unit**parameter.of_length
+    of_load, of_length = parameter.powers
+    return load**of_load * rod.length_unit**of_length
 
 
 def stated_values(rod: Rod, cell: LoadCell) -> dict[str, float]:

@@ -18,8 +18,8 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood import shortening
 from tactile_bayes.inference.record_likelihood.shortening import MOST_SAMPLES, shortened, thinned
 from tactile_bayes.load_cell import zero_load
-from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.load_cell.lone_samples import wandering_deviation
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING
 

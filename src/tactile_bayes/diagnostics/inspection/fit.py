@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.load_cell.covariance import wandering_deviation
+from tactile_bayes.load_cell.lone_samples import wandering_deviation
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, frame_of, loads_of
 from tactile_bayes.record.origin import column_entry
