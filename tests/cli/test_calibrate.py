@@ -64,7 +64,7 @@ def test_the_rig_of_the_truth_is_passed_on(asked, tmp_path, rig_file, monkeypatc
         given.append(options)
         raise CalibrationError("that is enough")
 
-    monkeypatch.setattr("tactile_bayes.runs.calibration.calibrate_into", calibrate_into)
+    monkeypatch.setattr("tactile_bayes.runs.verdicts.calibrate_into", calibrate_into)
     truth = rig_file("[unknown]\nfriction = 0.3\nbase_2_x = 0.01\n", "truth.toml")
     assert_refused(call(*asked, "--out", tmp_path, "--truth", truth), "that is enough")
     (options,) = given

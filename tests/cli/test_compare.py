@@ -8,7 +8,7 @@ from helpers.commands import call
 from helpers.comparisons import NAMES, made_up
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.record.netcdf import RESULT_FORMAT
-from tactile_bayes.runs import comparison as comparison_run
+from tactile_bayes.runs import verdicts as comparison_run
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 

@@ -62,7 +62,7 @@ def test_an_interrupt_says_what_the_same_command_does(asked, tmp_path, monkeypat
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tactile_bayes.runs.design.design_into", interrupted)
+    monkeypatch.setattr("tactile_bayes.runs.plans.design_into", interrupted)
     result = call(*asked, "--out", tmp_path, *nested)
     assert result.exit_code == 130
     assert re.fullmatch(f"tactile-bayes: interrupted, {told}\n", result.stderr)

@@ -10,7 +10,7 @@ import xarray as xr
 import tactile_bayes as tb
 from helpers import commands
 from tactile_bayes.planning.error_cell import CellOutcome
-from tactile_bayes.runs import sensitivity as sensitivity_run
+from tactile_bayes.runs import plans as sensitivity_run
 
 error_map_module = importlib.import_module("tactile_bayes.planning.error_map")
 

@@ -21,7 +21,7 @@ from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.stored_experiment import points_of
 from tactile_bayes.inference.target import Target, result, target
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.report.reproduction import hindrances
+from tactile_bayes.report.background import hindrances
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.rig_prior import RigPrior
 

@@ -42,13 +42,12 @@ from tactile_bayes.inference.result import posterior_draws, read_result, record_
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, record_hash, rod_of
 from tactile_bayes.report import write_report
+from tactile_bayes.report.background import hindrances
 from tactile_bayes.report.contour_figure import contour_figure
 from tactile_bayes.report.drawing import Plot, Scale
 from tactile_bayes.report.findings import findings_of
-from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.page import page_of
-from tactile_bayes.report.readings_figure import readings_figure
-from tactile_bayes.report.reproduction import hindrances
+from tactile_bayes.report.readings_figure import motion_of, readings_figure
 from tactile_bayes.report.trust import contacts_messages
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.reconstruction import reconstruction_messages

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tactile_bayes.runs.design import design_messages
+from tactile_bayes.runs.plans import design_messages
 
 
 def found(places, widths, gaps):

@@ -14,23 +14,17 @@ from typer.core import TyperGroup
 
 from tactile_bayes.cli.analysis import demo, infer
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.calibration import calibrate
+from tactile_bayes.cli.calibration import calibrate, calibrate_rig
 from tactile_bayes.cli.command import as_command
-from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
 from tactile_bayes.cli.describing import rig
-from tactile_bayes.cli.design import design
-from tactile_bayes.cli.figures import figures
-from tactile_bayes.cli.inspection import inspect
-from tactile_bayes.cli.measurement import measure
+from tactile_bayes.cli.inspection import inspect, reconstruct
 from tactile_bayes.cli.numbers import as_typed
-from tactile_bayes.cli.reconstruction import reconstruct
-from tactile_bayes.cli.report import report
-from tactile_bayes.cli.rig_calibration import calibrate_rig
-from tactile_bayes.cli.scanning import scan
-from tactile_bayes.cli.sensitivity import sensitivity
+from tactile_bayes.cli.pages import figures, report
+from tactile_bayes.cli.plans import design, sensitivity
+from tactile_bayes.cli.simulation import measure, scan
 from tactile_bayes.cli.streams import accept_every_text
-from tactile_bayes.cli.trust import trust
+from tactile_bayes.cli.verdicts import compare, trust
 from tactile_bayes.cli.watching import watch
 from tactile_bayes.errors import TactileBayesError, TactileBayesWarning
 from tactile_bayes.matplotlib_defaults import ignore_user_settings

@@ -1,4 +1,4 @@
-"""The command `calibrate`: coverage of intervals over simulated records."""
+"""The commands `calibrate` and `calibrate-rig`: coverage over simulated records, and the rig from a known contour."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.progress import WorkerOptions, resumable_bar
-from tactile_bayes.cli.rig_options import RigFile
-from tactile_bayes.cli.scan_options import Pivots, pivots_in
-from tactile_bayes.runs.names import CALIBRATION
+from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, sampling_bar
+from tactile_bayes.cli.rig_options import RigFile, RigOptions
+from tactile_bayes.cli.scan_options import GaugeOptions, Pivots, pivots_in
+from tactile_bayes.runs.names import CALIBRATION, RIG
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tactile_bayes.calibration.replicate import Replicate
+    from tactile_bayes.runs.rig import RigRun
 
 
 def calibrate(
@@ -53,7 +55,7 @@ def calibrate(
     import numpy as np
 
     from tactile_bayes.rig import Rig
-    from tactile_bayes.runs.calibration import calibrate_into
+    from tactile_bayes.runs.verdicts import calibrate_into
     from tactile_bayes.sweep import Rotation
 
     common = ctx.find_root().params
@@ -121,3 +123,50 @@ def _table(found: xr.Dataset) -> Table:
             rows.append((CLAIMS[row["claim"]], held, f"{count:,}"))
     stated = f"stated with {found.attrs['probability']:.0%}"
     return table_of([stated, "holds in", "of replicates"], rows, left=[stated])
+
+
+def calibrate_rig(
+    *,
+    record: Annotated[
+        list[Path], "Records of the gauge, .csv or .nc, each with its own zeros and its pivots.", typer.Argument()
+    ],
+    out: Annotated[Out, Writes(RIG)],
+    gauge: GaugeOptions,
+    rig: RigOptions,
+    probability: Annotated[float, "Probability of the intervals.", typer.Option(min=0.0, max=1.0)] = 0.95,
+    seed: Seed = 1,
+    output: Output,
+) -> Answer:
+    """Calibrate the rig on a gauge: infer stiffness, encoder, lever and the like from sweeps along a known contour.
+
+    Its rig.toml is for --rig of the other commands, and of this one, where records of another gauge or place add to it.
+    """
+    from tactile_bayes.runs.rig import calibrate_rig_into
+
+    contour, read = gauge.contour, [rig.read(path) for path in record]
+    with sampling_bar(output.is_silent) as progress:
+        run = calibrate_rig_into(
+            out,
+            [measured for measured, _ in read],
+            contour=contour,
+            probability=probability,
+            rig=read[0][1],
+            rng=seed,
+            progress=progress,
+        )
+    return Answer([*run.messages, "", quantities(run.summary, {}), "", run.files], lambda: _numbers(run))
+
+
+def _numbers(run: RigRun) -> dict[str, Any]:
+    assert run.result.calibration is not None
+    assert run.result.calibration.posterior is not None
+    attrs = run.result.calibration.posterior.attrs
+    return {
+        "words": run.messages,
+        "converged": bool(attrs["converged"]),
+        "message": attrs["message"],
+        "gauge": attrs["gauge"],
+        "probability": run.summary.attrs["probability"],
+        "quantities": columns_of(run.summary, "quantity"),
+        "files": run.files,
+    }

@@ -1,20 +1,21 @@
-"""The command `inspect`: the contents of a file, and what looks wrong, before anything is inferred from it."""
+"""The commands `inspect` and `reconstruct`: what is in a file and looks wrong, and contact points sample by sample."""
 
 from __future__ import annotations
 
 import shlex
 import warnings
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
-from tactile_bayes.cli.command import Output, Writes
+from tactile_bayes.cli.command import Out, Output, Writes
 from tactile_bayes.cli.numbers import assigned
 from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import Record, RigOptions
 from tactile_bayes.errors import RecordWarning
-from tactile_bayes.runs.names import INSPECTION
+from tactile_bayes.runs.names import INSPECTION, RECONSTRUCTION
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from tactile_bayes.diagnostics.inspection import Inspection
     from tactile_bayes.rig import Rig
+    from tactile_bayes.runs.reconstruction import ReconstructionRun
 
 _SOURCES = {
     "given": "as rig.toml and options say",
@@ -31,6 +33,13 @@ _SOURCES = {
     "unloaded samples": "not stated, found in the unloaded samples",
     "nothing": "neither stated nor found",
     "too few unloaded samples": "not stated, and too few unloaded samples to estimate it",
+}
+_NOISE_SOURCES = {
+    "data sheet": "The noise is that of the load cell as the file states it.",
+    "unloaded samples": "No noise is stated: bias and noise are taken from the unloaded samples.",
+    "nothing": "There is no noise, neither stated nor in unloaded samples: no standard deviations.",
+    "too few unloaded samples": "No noise is stated, and too few samples are unloaded to estimate it: every "
+    "sample counts as loaded. Give --force-noise and --moment-noise.",
 }
 
 
@@ -272,3 +281,45 @@ def _suspicious(samples: xr.Dataset) -> dict[str, Any]:
         else:
             numbers[kind] = np.flatnonzero(flags)
     return numbers
+
+
+def reconstruct(
+    *,
+    record: Record,
+    out: Annotated[Out, Writes(RECONSTRUCTION)],
+    method: Annotated[
+        Literal["raw", "constrained"] | None,
+        "raw uses the four numbers of a sample as they are; constrained, the default if there is noise, finds the most "
+        "probable contact that a rod can make.",
+    ] = None,
+    rig: RigOptions,
+    output: Output,
+) -> Answer:
+    """Find contact points with standard deviations (Step 2), from every sample in contact.
+
+    Numbers under [unknown] of rig.toml, like friction = 0.2, are taken into account. Noise that is not stated is
+    estimated from the samples before first contact and after snap-off.
+    """
+    with step_bar(output.is_silent) as show:
+        from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_messages
+
+        measured, of_record = rig.read(record)
+        show(1, 2)
+        run = reconstruct_into(measured, out, method=method, rig=of_record)
+    words = reconstruction_messages(run.result)
+    source = [_NOISE_SOURCES[run.source]] if run.source in _NOISE_SOURCES else []
+    return Answer([*words, *source, "", run.files], lambda: _contact_numbers(run, words))
+
+
+def _contact_numbers(run: ReconstructionRun, words: tuple[str, ...]) -> dict[str, Any]:
+    attrs = run.result.attrs
+    misfit = ("misfit_sum", "misfit_samples", "misfit_probability", "axial_score")
+    return {
+        "words": words,
+        **{name: attrs[name] for name in ("method", "friction", "units")},
+        "samples": dict(Counter(run.result.status.values.tolist()).most_common()),
+        **{name: attrs.get(name) for name in misfit},
+        "load_cell": run.load_cell.entries() if run.load_cell is not None else None,
+        "load_cell_source": run.source,
+        "files": run.files,
+    }

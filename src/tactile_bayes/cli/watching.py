@@ -230,7 +230,7 @@ class _Follower:
 
     def write_page(self, headline: str, sentences: Sequence[str], *, is_well: bool, is_last: bool = False) -> None:
         """Write the page of the last answer."""
-        from tactile_bayes.report.watch_page import write_watch_page
+        from tactile_bayes.report.writing import write_watch_page
 
         assert self.last is not None
         write_watch_page(
