@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tactile_bayes.calibration.replicate import Replicate
-    from tactile_bayes.runs.rig import RigRun
 
 
 def calibrate(
@@ -77,15 +76,8 @@ def calibrate(
         run = calibrate_into(out, replicates=replicates, workers=work.reporting(note), **experiment)
     found = run.result
     names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
-    return Answer(
-        [found.attrs["verdict"], "", _table(found), "", run.files],
-        lambda: {
-            "words": [found.attrs["verdict"]],
-            **{name: found.attrs[name] for name in names},
-            "claims": columns_of(found, "claim"),
-            "files": run.files,
-        },
-    )
+    numbers = {**{name: found.attrs[name] for name in names}, "claims": columns_of(found, "claim")}
+    return Answer.of([found.attrs["verdict"]], run.files, _table(found), **numbers)
 
 
 def _of_replicate(made: Replicate) -> Answer:
@@ -154,19 +146,13 @@ def calibrate_rig(
             rng=seed,
             progress=progress,
         )
-    return Answer([*run.messages, "", quantities(run.summary, {}), "", run.files], lambda: _numbers(run))
-
-
-def _numbers(run: RigRun) -> dict[str, Any]:
-    assert run.result.calibration is not None
-    assert run.result.calibration.posterior is not None
-    attrs = run.result.calibration.posterior.attrs
-    return {
-        "words": run.messages,
-        "converged": bool(attrs["converged"]),
-        "message": attrs["message"],
-        "gauge": attrs["gauge"],
-        "probability": run.summary.attrs["probability"],
-        "quantities": columns_of(run.summary, "quantity"),
-        "files": run.files,
-    }
+    attrs = run.result.attrs
+    return Answer.of(
+        run.messages,
+        run.files,
+        quantities(run.summary, {}),
+        converged=bool(attrs["converged"]),
+        **{name: attrs[name] for name in ("message", "gauge")},
+        probability=run.summary.attrs["probability"],
+        quantities=columns_of(run.summary, "quantity"),
+    )

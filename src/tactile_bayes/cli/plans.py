@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tactile_bayes.rig import Rig
-    from tactile_bayes.runs.folder import Run
     from tactile_bayes.runs.plans import Material, SensitivityRun
     from tactile_bayes.sweep import Carried, Drive
 
@@ -99,7 +98,15 @@ def design(
             **options,
         )
     words = made.files["words"].read_text(encoding="utf-8").splitlines()
-    return Answer([*words, "", made.files], lambda: _numbers(made, words))
+    found = made.result
+    columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
+    return Answer.of(
+        words,
+        made.files,
+        best=int(found.best),
+        present_width=float(found.present_width),
+        candidates=found[columns].to_dataframe()[columns].to_dict("records"),
+    )
 
 
 def _as_often(drive: Carried, step: float) -> Carried:
@@ -117,20 +124,6 @@ def _posterior(run: Path) -> xr.DataTree:
 
     is_the_file = run.is_file() or (run.suffix == ".nc" and not run.exists())
     return read_result(run if is_the_file else posterior_in(run))
-
-
-def _numbers(made: Run[xr.Dataset], words: list[str]) -> dict[str, Any]:
-    found = made.result
-    columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
-    return {
-        "words": words,
-        "best": int(found.best),
-        "present_width": float(found.present_width),
-        "candidates": [
-            {name: found[name].values[k].item() for name in columns} for k in range(found.sizes["candidate"])
-        ],
-        "files": made.files,
-    }
 
 
 def sensitivity(
@@ -253,8 +246,7 @@ def _answer(run: SensitivityRun) -> Answer:
     words = run.result.attrs["words"].splitlines()
     if run.rods is not None:
         words.append(rod_message(run.rods))
-    table = _bounds(run.result["information"].to_dataset())
-    return Answer([*words, "", table, "", run.files], lambda: _sensitivity_numbers(run, words))
+    return Answer.of(words, run.files, _bounds(run.result["information"].to_dataset()), **_numbers(run))
 
 
 def _bounds(information: xr.Dataset) -> Table:
@@ -268,12 +260,11 @@ def _bounds(information: xr.Dataset) -> Table:
     return table_of(["parameter", "value", "known to ±", "unit"], rows, left=["parameter", "unit"])
 
 
-def _sensitivity_numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any]:
+def _numbers(run: SensitivityRun) -> dict[str, Any]:
     """Return the main results for JSON."""
     found = run.result
     information, needed = found["information"].to_dataset(), found["required_noise"].to_dataset()
     answer: dict[str, Any] = {
-        "words": words,
         **{name: found.attrs[name] for name in ("contour", "units", "rod_length", "rod_flexural_rigidity")},
         **{name: float(found.attrs[name]) for name in ("force_noise", "moment_noise")},
         "parameters": {
@@ -289,7 +280,6 @@ def _sensitivity_numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any
             {name: needed[name][i] for name in ("band_width", "noise_factor", "force_noise", "moment_noise")}
             for i in range(needed.sizes["band_width"])
         ],
-        "files": run.files,
     }
     if run.rods is not None:
         answer["rod"] = {name: run.rods[f"best_{name}"] for name in ("length", "diameter", "width")}

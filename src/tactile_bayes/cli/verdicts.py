@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.inference.ensembles import Progress
 
 _POOR_K = 0.7  # Pareto k̂ above which a leave-one-out density cannot be trusted
 
@@ -50,11 +49,6 @@ def compare(
 
     measured, of_record = rig.read(record)
     with sampling_bar(output.is_silent, max_seconds=max_seconds) as show:
-
-        def note(name: str, progress: Progress) -> None:
-            if show is not None:
-                show(progress, name)
-
         run = compare_into(
             measured,
             out,
@@ -63,19 +57,12 @@ def compare(
             leave_one_out=leave_one_out,
             rng=seed,
             settings=SamplerSettings(max_seconds=max_seconds),
-            progress=note,
+            progress=lambda name, progress: show and show(progress, name),
         )
     found = run.result
     attrs = {name: found.attrs[name] for name in ("verdict", "prior_width") if name in found.attrs}
-    return Answer(
-        [found.attrs["verdict"], "", _table(found), *_reservations(found), "", run.files],
-        lambda: {
-            "words": [found.attrs["verdict"]],
-            **attrs,
-            "families": columns_of(found, "family"),
-            "files": run.files,
-        },
-    )
+    further = _table(found), *_reservations(found)
+    return Answer.of([found.attrs["verdict"]], run.files, *further, **attrs, families=columns_of(found, "family"))
 
 
 def _reservations(found: xr.Dataset) -> Iterator[str]:
