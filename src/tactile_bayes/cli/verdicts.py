@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -61,7 +61,7 @@ def compare(
         )
     found = run.result
     attrs = {name: found.attrs[name] for name in ("verdict", "prior_width") if name in found.attrs}
-    further = _table(found), *_reservations(found)
+    further: list[Any] = [_table(found), *_reservations(found)]
     return Answer.of([found.attrs["verdict"]], run.files, *further, **attrs, families=columns_of(found, "family"))
 
 

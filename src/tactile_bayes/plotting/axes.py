@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from inspect import cleandoc, signature
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -19,6 +20,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 AxesArray = NDArray[np.object_]
+Plot = TypeVar("Plot", bound=Callable[..., Any])
+
+# What many plots take, by the name of the parameter, as their docstrings state it.
+_TAKEN = {"truth": "truth : Contour, optional\n    The true contour.", "ax": "ax : Axes, optional"}
+
+
+def plot(refusal: str = "") -> Callable[[Plot], Plot]:
+    """Complete the docstring of a plot by what many of them take, and by when it raises ParameterError."""
+
+    def completed(function: Plot) -> Plot:
+        said, _, examples = cleandoc(function.__doc__ or "").partition("\nExamples\n")
+        taken = [
+            _TAKEN[name] for name in signature(function).parameters if name in _TAKEN and f"\n{name} :" not in said
+        ]
+        said = "\n".join([said.rstrip(), *taken, ""])
+        raises = f"\nRaises\n------\nParameterError\n    If {refusal}.\n" if refusal else ""
+        function.__doc__ = f"{said}{raises}\nExamples\n{examples}"
+        return function
+
+    return completed
 
 
 def axes_for(ax: Axes | None, truth: Any = None, *, height: float | None = None) -> Axes:

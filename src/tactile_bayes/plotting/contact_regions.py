@@ -13,7 +13,7 @@ from tactile_bayes.arrays import Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.plotting.axes import axes_for, checked_samples
+from tactile_bayes.plotting.axes import axes_for, checked_samples, plot
 from tactile_bayes.plotting.labels import percent
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import finish_map, fit_height, outline
@@ -29,6 +29,7 @@ _DRAWN = 12
 _MIDDLE: dict[str, Any] = {"marker": "+", "markersize": 5.0, "zorder": 3}
 
 
+@plot("no sample has an ellipse, or the probability is not in (0, 1)")
 def contact_ellipses(
     contacts: xr.Dataset,
     *,
@@ -50,12 +51,6 @@ def contact_ellipses(
         those whose status is "ok", or whose draws are all in contact.
     truth : Contour, optional
         The true contour, in the units of the contacts.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If no sample has an ellipse, or the probability is not in (0, 1).
 
     Examples
     --------
@@ -92,6 +87,7 @@ def contact_ellipses(
     return _finished(ax, contacts, phase[chosen], f"{percent(probability)} ellipse", truth, own)
 
 
+@plot("no sample has a contact, or the probability is not in (0, 1)")
 def contact_regions(
     posterior: xr.DataTree,
     *,
@@ -111,14 +107,6 @@ def contact_regions(
     samples : sequence of int, optional
         Labels of samples in the coordinate "sample", of which those without a contact are left out; by default a dozen
         of those with one, evenly spread. A region has the colour of its more probable phase.
-    truth : Contour, optional
-        The true contour.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If no sample has a contact, or the probability is not in (0, 1).
 
     Examples
     --------

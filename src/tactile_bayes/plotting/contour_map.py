@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_array, check_mapping, check_numbers, check_optional, check_switch
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import axes_for, check_dataset, write_instead
+from tactile_bayes.plotting.axes import axes_for, check_dataset, plot, write_instead
 from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
 from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, outline
@@ -36,6 +36,7 @@ _EDGES = {"x", "lower", "median", "upper"}
 _GAP = {"left", "right", "bound"}
 
 
+@plot("`x` does not span a range")
 def contour(
     x: ArrayLike,
     *,
@@ -52,8 +53,6 @@ def contour(
     ----------
     x : array_like, shape (n,)
         Numbers that span the range drawn, in the record's unit of length.
-    truth : Contour, optional
-        The true contour.
     contacts : xr.Dataset, optional
         Over "sample": contact_x and contact_y; contact_phase colours the points, and of those with a status only "ok"
         is drawn.
@@ -64,12 +63,6 @@ def contour(
         result of `tactile_bayes.gap`, of which the medians are drawn.
     base : (float, float), optional
         The pivot, in the record's unit of length.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If `x` does not span a range.
 
     Examples
     --------
@@ -116,6 +109,7 @@ def contour(
     return ax
 
 
+@plot()
 def band_detail(
     band: xr.Dataset,
     *,
@@ -130,13 +124,10 @@ def band_detail(
     ----------
     band : xr.Dataset
         Over coordinate "x": lower, upper and median.
-    truth : Contour, optional
-        The true contour.
     gap : (float, float) or xr.Dataset, optional
         As in `contour`.
     shape : xr.Dataset, optional
         A further band, of the shape alone (`contour_band(..., align="translation")`), drawn from its own median.
-    ax : Axes, optional
 
     Examples
     --------
@@ -168,6 +159,7 @@ def band_detail(
     return ax
 
 
+@plot("there is no band, or something is none")
 def overlaid(
     bands: Mapping[str, xr.Dataset],
     *,
@@ -189,12 +181,6 @@ def overlaid(
     enlarged : bool
         If True, y is measured from `overlay`, or without it from the median of the first run, so that narrow bands are
         visible; contacts are then left out.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If there is no band, or something is none.
 
     Examples
     --------
@@ -242,6 +228,7 @@ def overlaid(
     return ax
 
 
+@plot()
 def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = None) -> Axes:
     """Draw certificate and band of the contour inside the gap, measured from the chord between the end contacts.
 
@@ -253,9 +240,6 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     ----------
     found : xr.Dataset
         From `tactile_bayes.gap`.
-    truth : Contour, optional
-        The true contour.
-    ax : Axes, optional
 
     Examples
     --------

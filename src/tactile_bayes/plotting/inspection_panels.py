@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.checks import check_kind
-from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, plot, write_not_measured
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis, finish_channels, reading_style
 from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entry
@@ -31,6 +31,7 @@ _MARKS: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "marke
 _LEGEND = ["forward", "backward", "first contact", "snap-off", *(words for words, _ in _WRONG.values())]
 
 
+@plot("there are not three rows of two axes")
 def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     """Draw the observables of a record along the drive, marks of wrong samples, and unloaded samples enlarged.
 
@@ -44,11 +45,6 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
         colour of the sweep's direction; rings and other marks show samples that look wrong. The right Axes hold
         readings of the unloaded samples in the order of measurement, with their mean and two standard deviations to
         either side.
-
-    Raises
-    ------
-    ParameterError
-        If there are not three rows of two axes.
 
     Examples
     --------

@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_switch, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.plotting.axes import axes_for
+from tactile_bayes.plotting.axes import axes_for, plot
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
 from tactile_bayes.plotting.marks import PALETTE, TRUTH
@@ -30,6 +30,7 @@ _COUNT = "give a whole number from 1 up, like 40"
 _DASHED: dict[str, Any] = {"linestyle": (0, (6.0, 3.0)), "linewidth": 1.0}
 
 
+@plot("the tree has no prior draws, or `contours` is not positive")
 def prior_contours(
     posterior: xr.DataTree,
     *,
@@ -51,14 +52,6 @@ def prior_contours(
         Number of contours, evenly picked from the draws.
     median : bool
         If True, the posterior's median is drawn over them, along the touched stretch.
-    truth : Contour, optional
-        The true contour.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the tree has no prior draws, or `contours` is not positive.
 
     Examples
     --------
@@ -84,6 +77,7 @@ def prior_contours(
     return _draw(ax, posterior, contours, [layer], truth, touched=touched, entry_width=_THIN)
 
 
+@plot("the tree is not a posterior of a contour, or `contours` is not positive")
 def posterior_contours(
     posterior: xr.DataTree, *, contours: int = 40, truth: Contour | None = None, ax: Axes | None = None
 ) -> Axes:
@@ -98,14 +92,6 @@ def posterior_contours(
         From `infer_contour`; without a group `prior` the posterior alone is drawn.
     contours : int
         Number of contours of each, evenly picked from the draws.
-    truth : Contour, optional
-        The true contour.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the tree is not a posterior of a contour, or `contours` is not positive.
 
     Examples
     --------

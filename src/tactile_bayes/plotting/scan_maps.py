@@ -13,7 +13,7 @@ from tactile_bayes.checks import check_choice, check_kind, check_whole_number, s
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.plotting import maps
-from tactile_bayes.plotting.axes import axes_for
+from tactile_bayes.plotting.axes import axes_for, plot
 from tactile_bayes.plotting.drive_axis import ENDINGS
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend_entry
@@ -38,6 +38,7 @@ _ARC_WIDTH = 3.0
 _OFFSET = np.sqrt(2.0) * _ARC_WIDTH
 
 
+@plot("the scan has no such sweep, or several of this direction, or the count is not positive")
 def rods(
     scan: Scan,
     *,
@@ -61,12 +62,6 @@ def rods(
     count : int
         Largest number of rods, evenly over the samples in contact; those at first contact, phase changes and snap-off
         are added.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the scan has no such sweep, or several of this direction, or the count is not positive.
 
     Examples
     --------
@@ -124,6 +119,7 @@ def rods(
     return ax
 
 
+@plot("`scan` is not a scan")
 def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     """Draw the arcs of the contour that the sweeps touched, in a colour for each base, and the gaps between them.
 
@@ -136,12 +132,6 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     ----------
     scan : Scan
         A scan, from one base or several.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If `scan` is not a scan.
 
     Examples
     --------

@@ -10,7 +10,7 @@ import xarray as xr
 
 from tactile_bayes.checks import check_probability, refused
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, check_drawing, check_panels, checked_samples
+from tactile_bayes.plotting.axes import AxesArray, check_drawing, check_panels, checked_samples, plot
 from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, is_certain, radius_of
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, show_numbers
 from tactile_bayes.plotting.legends import legend_above, legend_entry
@@ -31,6 +31,7 @@ _HIGHEST = 0.9  # largest height of the map over that of each row below it
 _PANEL = 0.25  # height of a row below the map over the width of the figure
 
 
+@plot("the two are not of one record, there are not three contacts to be enlarged, or the probability is not in (0, 1)")
 def tightening(
     implied: xr.DataTree,
     single: xr.DataTree | xr.Dataset,
@@ -57,16 +58,8 @@ def tightening(
         Probability of each ellipse, in (0, 1).
     samples : sequence of int, optional
         The three samples that are enlarged; by default evenly picked from the sweep with the most contacts.
-    truth : Contour, optional
-        The true contour.
     axes : array_like of Axes, shape (5,), optional
         Axes for the map, the three details, and the ratios.
-
-    Raises
-    ------
-    ParameterError
-        If the two are not of one record, there are not three contacts to be enlarged, or the probability is not in
-        (0, 1).
 
     Examples
     --------
