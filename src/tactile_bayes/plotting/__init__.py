@@ -8,7 +8,7 @@ or for the screen.
 
 from tactile_bayes.plotting.alternatives import assumptions, families
 from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverage
-from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
+from tactile_bayes.plotting.contacts import contact_ellipses, contact_regions, tightening
 from tactile_bayes.plotting.contour_map import band_detail, contour, gap, overlaid
 from tactile_bayes.plotting.design_map import design
 from tactile_bayes.plotting.inspection_panels import inspection
@@ -20,7 +20,6 @@ from tactile_bayes.plotting.requirements import error_map, required_noise, requi
 from tactile_bayes.plotting.scan_maps import rods, touched
 from tactile_bayes.plotting.style import style
 from tactile_bayes.plotting.sweep_plans import amplification, information, noise_shares
-from tactile_bayes.plotting.tightening import tightening
 
 __all__ = ["PALETTE", "amplification", "assumptions", "band_detail", "calibration_ranks", "contact_ellipses"]
 __all__ += ["contact_regions", "contour", "coverage", "design", "error_map", "families", "gap", "information"]

@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.plotting.axes import AxesArray, axes_for, check_dataset, check_panels, label_rows, new_panels, plot
-from tactile_bayes.plotting.labels import number, show_numbers
-from tactile_bayes.plotting.legends import legend
+from tactile_bayes.plotting.labels import legend, number, show_numbers
 from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:

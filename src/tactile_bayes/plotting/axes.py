@@ -24,10 +24,22 @@ Plot = TypeVar("Plot", bound=Callable[..., Any])
 
 # What many plots take, by the name of the parameter, as their docstrings state it.
 _TAKEN = {"truth": "truth : Contour, optional\n    The true contour.", "ax": "ax : Axes, optional"}
+# What their examples begin with, by the name that it makes.
+_MADE = {
+    "scanned": """
+>>> import tactile_bayes as tb
+>>> scanned = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.1)""",
+    "measured": """
+>>> cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+>>> measured = cell.measure(scanned.record, rng=1)""",
+    "inferred": """
+>>> stated, quick = tb.Rig(unknown="nothing"), tb.SamplerSettings(min_ess=100, max_r_hat=1.1)
+>>> inferred = tb.infer_contour(measured, rig=stated, rng=1, settings=quick)""",
+}
 
 
-def plot(refusal: str = "") -> Callable[[Plot], Plot]:
-    """Complete the docstring of a plot by what many of them take, and by when it raises ParameterError."""
+def plot(refusal: str = "", example: str = "") -> Callable[[Plot], Plot]:
+    """Complete the docstring of a plot by what many of them take, when it raises ParameterError, and its example."""
 
     def completed(function: Plot) -> Plot:
         said, _, examples = cleandoc(function.__doc__ or "").partition("\nExamples\n")
@@ -36,7 +48,8 @@ def plot(refusal: str = "") -> Callable[[Plot], Plot]:
         ]
         said = "\n".join([said.rstrip(), *taken, ""])
         raises = f"\nRaises\n------\nParameterError\n    If {refusal}.\n" if refusal else ""
-        function.__doc__ = f"{said}{raises}\nExamples\n{examples}"
+        made = "".join([*_MADE.values()][: 1 + list(_MADE).index(example)]) if example else ""
+        function.__doc__ = f"{said}{raises}\nExamples\n" + examples.replace("\n", f"{made}\n", 1)
         return function
 
     return completed

@@ -14,8 +14,16 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_array, check_mapping, check_numbers, check_optional, check_switch
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import axes_for, check_dataset, plot, write_instead
-from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
-from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
+from tactile_bayes.plotting.labels import (
+    LABELS,
+    legend_above,
+    legend_entries,
+    legend_entry,
+    number,
+    percent,
+    set_unit,
+    shown_unit,
+)
 from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, outline
 from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 

@@ -9,8 +9,7 @@ import numpy as np
 from tactile_bayes.checks import check_kind
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, plot, write_not_measured
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis, finish_channels, reading_style
-from tactile_bayes.plotting.labels import LABELS, set_unit
-from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.labels import LABELS, legend_entry, set_unit
 from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.record import CHANNELS, present_channels
 
@@ -31,7 +30,7 @@ _MARKS: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "marke
 _LEGEND = ["forward", "backward", "first contact", "snap-off", *(words for words, _ in _WRONG.values())]
 
 
-@plot("there are not three rows of two axes")
+@plot("there are not three rows of two axes", example="measured")
 def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     """Draw the observables of a record along the drive, marks of wrong samples, and unloaded samples enlarged.
 
@@ -48,11 +47,7 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, inspect_record, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5)).record, rng=1)
-    >>> inspection(inspect_record(measured))[0, 1].get_title()
+    >>> inspection(tb.inspect_record(measured))[0, 1].get_title()
     'unloaded'
     """
     from tactile_bayes.diagnostics.inspection import Inspection

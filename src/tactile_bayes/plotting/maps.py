@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.labels import LABELS, set_unit
-from tactile_bayes.plotting.legends import legend, legend_above, legend_entries
+from tactile_bayes.plotting.labels import LABELS, legend, legend_above, legend_entries, set_unit
 from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:

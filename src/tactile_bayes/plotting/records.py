@@ -10,7 +10,7 @@ import xarray as xr
 
 from tactile_bayes.checks import check_kind, check_mapping
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, plot, write_not_measured
 from tactile_bayes.plotting.drive_axis import (
     draw_events,
     drive_axis,
@@ -19,8 +19,7 @@ from tactile_bayes.plotting.drive_axis import (
     reading_style,
     with_events,
 )
-from tactile_bayes.plotting.labels import LABELS, set_unit
-from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.labels import LABELS, legend_entry, set_unit
 from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
 from tactile_bayes.record import CHANNELS, frame_of, validate
 from tactile_bayes.sweep import SweepEvents
@@ -43,6 +42,7 @@ _TURNING_LABELS = {
 }
 
 
+@plot(example="scanned")
 def observables(
     record: xr.Dataset, *, events: Mapping[str, SweepEvents] | None = None, axes: Sequence[Axes] | None = None
 ) -> AxesArray:
@@ -73,10 +73,7 @@ def observables(
 
     Examples
     --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> result = scan(paper_profile("II", q=0.5))
-    >>> observables(result.record, events=result.events)[-1].get_xlabel()
+    >>> observables(scanned.record, events=scanned.events)[-1].get_xlabel()
     'drive angle $\\\\varphi_0$ [°]'
     """
     record = validate(record)
@@ -90,6 +87,7 @@ def observables(
     return panels
 
 
+@plot(example="measured")
 def predictive(
     record: xr.Dataset,
     predicted: xr.Dataset,
@@ -129,12 +127,8 @@ def predictive(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> ideal = scan(paper_profile("II", q=0.5)).record
-    >>> measured = LoadCell(moment_noise=0.02, force_noise=0.05).measure(ideal, rng=1)
-    >>> ends = {"lower": -0.04, "upper": 0.04}
-    >>> predicted = xr.Dataset({f"holding_moment_{end}": ideal["holding_moment"] + off for end, off in ends.items()})
+    >>> ends, true = {"lower": -0.04, "upper": 0.04}, scanned.record["holding_moment"]
+    >>> predicted = xr.Dataset({f"holding_moment_{end}": true + off for end, off in ends.items()})
     >>> predictive(measured, predicted).shape
     (3,)
     """

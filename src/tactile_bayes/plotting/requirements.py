@@ -11,8 +11,17 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice
 from tactile_bayes.plotting.axes import axes_for, check_among, check_dataset, group_of, plot, tile_edges, write_instead
-from tactile_bayes.plotting.labels import number, percent, set_log_scale, set_unit, show_numbers, shown_unit
-from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
+from tactile_bayes.plotting.labels import (
+    legend,
+    legend_above,
+    legend_entry,
+    number,
+    percent,
+    set_log_scale,
+    set_unit,
+    show_numbers,
+    shown_unit,
+)
 from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
