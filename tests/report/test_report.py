@@ -504,13 +504,6 @@ def test_what_is_no_run_is_refused(folder, tmp_path):
     assert not (tmp_path / "report.html").exists()
 
 
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9, 0.9999])
-def test_a_file_that_was_cut_short_is_refused(folder, tmp_path, share):
-    content = (folder / "posterior.nc").read_bytes()
-    (tmp_path / "posterior.nc").write_bytes(content[: int(share * len(content))])
-    not_reported(tmp_path, "posterior.nc", "damaged")
-
-
 def test_a_comparison_that_is_none_or_of_another_record_is_refused(folder, tmp_path):
     not_reported(folder, "comparison.nc", "--compare", compare=tmp_path)
     path = tmp_path / "comparison.nc"

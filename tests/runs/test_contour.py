@@ -7,9 +7,8 @@ import pandas as pd
 import pytest
 
 from helpers.contour_posteriors import QUICK, without
-from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.inference.stored_experiment import contact_points
@@ -91,13 +90,6 @@ def test_without_a_posterior_the_former_run_stays_whole_and_wrong_units_are_susp
     with pytest.raises(type(error), match=message):
         analyse(record, tmp_path, rng=1)
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
-
-
-@pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])
-def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_path, probability):
-    with refused(ParameterError, probability=probability):
-        analyse(measured, tmp_path / "run", probability=probability, rng=1)
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.usefixtures("undrawn")

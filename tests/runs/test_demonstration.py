@@ -7,7 +7,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import MEASURED, rod_of, write_record
 from tactile_bayes.rig import Rig, read_record
-from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
+from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, measure_demo
 from tactile_bayes.sweep import scan
 
 
@@ -33,10 +33,6 @@ def test_it_is_the_scan_of_the_contour_with_the_noise_that_is_stated(path):
     deviations = LOAD_CELL.standard_deviations
     noise = np.concatenate([((record[name] - true[name]) / deviations[name]).values for name in deviations])
     assert abs(np.mean(noise**2) - 1.0) < 5.0 * np.sqrt(2.0 / noise.size)
-
-
-def test_the_truth_that_is_printed_is_that_of_the_contour():
-    assert {name: TRUTH[name] for name in ("a", "q", "x_c")} == vars(CONTOUR)
 
 
 def test_the_seed_decides_and_a_demonstration_is_replaced_by_another(path, tmp_path):

@@ -1,6 +1,8 @@
-"""The command `sensitivity`, as a user calls it."""
+"""The commands `sensitivity` and `design`, as a user calls them."""
 
+import csv
 import importlib
+import re
 from functools import partial
 
 import numpy as np
@@ -176,3 +178,57 @@ def test_no_rod_that_serves_is_said():
     words = sensitivity_run.rod_message(rods)
     assert words.startswith("None of 2 rods ")
     assert words.endswith("(1 {}, 1 {}).".format(*statuses))
+
+
+ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--draws", "2"]
+
+
+@pytest.fixture(scope="module")
+def drives_asked(as_stated):
+    return (*ASKED, "--rig", as_stated, "--workers", 1)
+
+
+@pytest.fixture(scope="module")
+def made(drives_asked, tmp_path_factory, coarse_pictures):
+    out = tmp_path_factory.mktemp("design")
+    return commands.succeed(*drives_asked, "--out", out, "--quiet"), out
+
+
+def test_it_says_where_and_writes_what_it_found(made):
+    result, out = made
+    assert result.stdout.startswith("Put the pivot at (")
+    assert sorted(path.name for path in out.iterdir()) == ["candidates.csv", "design.nc", "design.png", "words.txt"]
+    found = xr.load_dataset(out / "design.nc", engine="h5netcdf")
+    table = np.genfromtxt(out / "candidates.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(table["width"], found.width.values, rtol=1e-8)
+    np.testing.assert_allclose(table["base_x"], [0.0, 0.2])
+
+
+def test_drives_that_carry_the_base_are_candidates(drives_asked, tmp_path):
+    poses = tmp_path / "poses.csv"
+    poses.write_text("x,y,drive_angle\n0.8,0,65\n0,0.05,85\n-0.8,0,115\n")
+    answer = commands.answered(*drives_asked, "--carry", "0.8,0,180,65,1.6", "--carry", poses, "--out", tmp_path)
+    candidates = answer["candidates"]
+    assert answer["words"][0].startswith("Put the pivot")
+    assert [one["is_pivot"] for one in candidates] == [True, True, False, False]
+    assert candidates[0]["nested_width"] is None
+    assert candidates[3]["drive"] == "carried from (0.8, 0) to (-0.8, 0) at 65° to 115°"
+    assert candidates[0]["samples"] > candidates[2]["samples"] > 20
+    with (tmp_path / "candidates.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["drive"] for row in rows] == [one["drive"] for one in candidates]
+    np.testing.assert_allclose([float(row["width"]) for row in rows], [one["width"] for one in candidates], rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("nested", "told"),
+    [([], "nothing was written.*starts again"), (["--nested"], "no further candidate.*resumes")],
+)
+def test_an_interrupt_says_what_the_same_command_does(drives_asked, tmp_path, monkeypatch, nested, told):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tactile_bayes.runs.plans.design_into", interrupted)
+    result = commands.call(*drives_asked, "--out", tmp_path, *nested)
+    assert result.exit_code == 130
+    assert re.fullmatch(f"tactile-bayes: interrupted, {told}\n", result.stderr)
