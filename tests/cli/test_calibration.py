@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from helpers.commands import answered, assert_refused, call, succeed
+from helpers.commands import answered, assert_files, assert_refused, call, succeed
 from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.calibration.replicate import REPLICATES
 from tactile_bayes.contours import Circle, Parabola
@@ -32,31 +32,26 @@ def asked(as_stated):
 def done(asked, tmp_path_factory, coarse_pictures):
     """Two replicates, and what was said of them."""
     out = tmp_path_factory.mktemp("calibration") / "run"
-    result = succeed(*asked, "--out", out, "--replicates", 2)
-    return out, result.stdout
+    return out, succeed(*asked, "--out", out, "--replicates", 2)
 
 
 def test_the_verdict_comes_first_then_what_holds_then_the_files(done):
-    out, said = done
-    lines = said.splitlines()
+    out, result = done
+    lines = result.stdout.splitlines()
     assert [part for part in ("Too few", " 2 posteriors", " 20 ") if part not in lines[0]] == []
     assert lines[0] == (out / "verdict.txt").read_text(encoding="utf-8").strip()
     assert lines[2].split() == ["stated", "with", "90%", "holds", "in", "of", "replicates"]
     assert any(line.startswith("band, in the gap") for line in lines)
-    for what in ("replicates", "calibration", "verdict", "ranks", "coverage"):
-        path = next(line.split()[-1] for line in lines if line.startswith(f"{what} "))
-        assert path.startswith(str(out))
-    names = {REPLICATES.file, "calibration.nc", "verdict.txt", "ranks.png", "coverage.png"}
-    assert {path.name for path in out.iterdir()} == names
+    assert_files(result, out, {REPLICATES.file, "calibration.nc", "verdict.txt", "ranks.png", "coverage.png"})
     with xr.open_dataset(out / "calibration.nc", engine="h5netcdf") as found:
         assert found.sizes["replicate"] == 2
         assert (found.attrs["family"], found.attrs["calibrated"]) == ("parabola", 0)
 
 
 def test_the_same_command_makes_nothing_again_and_another_is_refused(asked, done):
-    out, said = done
+    out, result = done
     before = (out / REPLICATES.file).read_bytes()
-    assert call(*asked, "--out", out, "--replicates", 2).stdout == said
+    assert call(*asked, "--out", out, "--replicates", 2).stdout == result.stdout
     result = call(*asked, "--out", out, "--replicates", 2, "--seed", 2)
     assert_refused(result, out, "seed is 1 there and 2 here")
     assert (out / REPLICATES.file).read_bytes() == before
@@ -160,7 +155,7 @@ def calibrated(records, tmp_path_factory):
 def test_words_come_first_then_the_table_then_the_files(calibrated):
     result, folder = calibrated
     assert result.exit_code == 0, result.output
-    words, table, files = result.stdout.split("\n\n")
+    words, table, _ = result.stdout.split("\n\n")
     assert words.startswith("All is well")
     assert "take over rigidity_scale," in words.splitlines()[-1]
     rows = {line.split()[0]: line.split()[1:] for line in table.splitlines()}
@@ -168,8 +163,7 @@ def test_words_come_first_then_the_table_then_the_files(calibrated):
     estimate, low, high = map(float, rows["rigidity_scale"][:3])
     assert low < estimate < high
     assert abs(estimate - 1.04) < 1.5 * (high - low)  # six standard deviations
-    assert {path.name for path in folder.iterdir()} == {"rig.toml", "rig.nc", "summary.txt", "summary.csv"}
-    assert {line.split(maxsplit=1)[1] for line in files.splitlines()} == {str(path) for path in folder.iterdir()}
+    assert_files(result, folder, {"rig.toml", "rig.nc", "summary.txt", "summary.csv"})
     assert (folder / "summary.txt").read_text(encoding="utf-8").startswith(words)
 
 

@@ -41,8 +41,7 @@ def few_samples():
 def done(tmp_path_factory, coarse_pictures):
     """An analysis with a study, and what was said of it."""
     out = tmp_path_factory.mktemp("sensitivity") / "run"
-    result = succeed("--out", out, *STUDY, *QUICK)
-    return out, result.stdout
+    return out, succeed("--out", out, *STUDY, *QUICK)
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +71,8 @@ def asked(monkeypatch, analysed):
 
 
 def test_words_come_first_then_bounds_then_the_files(done, analysed):
-    out, said = done
-    words, table, files = said.split("\n\n")
+    out, result = done
+    words, table, _ = result.stdout.split("\n\n")
     assert words.splitlines() == (out / "words.txt").read_text(encoding="utf-8").splitlines()
     assert words == analysed.attrs["words"]
     rows = [line.split() for line in table.splitlines()]
@@ -85,18 +84,12 @@ def test_words_come_first_then_bounds_then_the_files(done, analysed):
         scale = np.degrees(1.0) if row[-1] == "°" else 1.0
         assert row[1:3] == [f"{scale * float(of.value):.3g}", f"{scale * float(of.bound_with_priors):.3g}"]
     assert rows[1 + list(told.parameter.values).index("drive_angle_offset")][-1] == "°"
-    paths = dict(line.split(maxsplit=1) for line in files.splitlines())
-    parts = {name.removesuffix(".png") for name in FIGURES}
-    assert set(paths) == {"sensitivity", "words", "cells", "study", "errors"} | parts
-    assert all(path.startswith(str(out)) for path in paths.values())
+    names = {"sensitivity.nc", "words.txt", "cells.json", "study.nc", "study.png"} | FIGURES
+    commands.assert_files(result, out, names)
 
 
 def test_files_hold_what_was_found(done, analysed):
     out, _ = done
-    assert {path.name for path in out.iterdir()} == {"sensitivity.nc", "words.txt", "study", *FIGURES}
-    assert {path.name for path in (out / "study").iterdir()} == {"cells.json", "study.nc", "study.png"}
-    for path in [*out.glob("*.png"), out / "study" / "study.png"]:
-        assert path.read_bytes().startswith(b"\x89PNG")
     with xr.open_datatree(out / "sensitivity.nc", engine="h5netcdf") as kept:
         assert kept.attrs["words"] == analysed.attrs["words"]
         for name, group in analysed.children.items():
@@ -197,7 +190,7 @@ def made(drives_asked, tmp_path_factory, coarse_pictures):
 def test_it_says_where_and_writes_what_it_found(made):
     result, out = made
     assert result.stdout.startswith("Put the pivot at (")
-    assert sorted(path.name for path in out.iterdir()) == ["candidates.csv", "design.nc", "design.png", "words.txt"]
+    commands.assert_files(result, out, ["candidates.csv", "design.nc", "design.png", "words.txt"])
     found = xr.load_dataset(out / "design.nc", engine="h5netcdf")
     table = np.genfromtxt(out / "candidates.csv", delimiter=",", names=True)
     np.testing.assert_allclose(table["width"], found.width.values, rtol=1e-8)
