@@ -5,12 +5,10 @@ import pytest
 import xarray as xr
 
 from helpers.comparisons import made_up
-from helpers.pictures import labels, own_axes, row_labels, texts
-from helpers.refusals import refused
+from helpers.pictures import labels, row_labels, texts
 from tactile_bayes import plotting
 from tactile_bayes.comparison.verdict import NONE_FITS
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.rig import Rig
@@ -92,14 +90,6 @@ def test_differences_that_are_large_do_not_hide_small_ones(worst):
     assert panels[1].get_xscale() == "symlog"
     assert panels[1].get_xlim()[0] < worst
     assert 3 <= len(panels[1].get_xticks()) <= 5
-
-
-def test_axes_that_do_not_fit_are_refused():
-    axes = own_axes(2)
-    with refused(ParameterError, "axes", "(2,)", "(1,)"):
-        plotting.families(made_up([0.5, 0.5]), axes=axes)
-    with refused(ParameterError, "axes", "(2,)", "elpd"):
-        plotting.families(made_up([0.5, 0.5], elpd=[0.0, -1.0]), axes=axes[0])
 
 
 # --- Assumptions ------------------------------------------------------------------------------------------------------

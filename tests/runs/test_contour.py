@@ -230,25 +230,21 @@ def test_a_figure_that_fails_is_named_and_the_others_are_drawn(measured, tmp_pat
     assert all(re.search(f"\nLeft out: figure {name}.*RuntimeError: it broke\n", text) for name in failed)
 
 
-def test_an_interrupt_after_sampling_leaves_out_one_part_alone(measured, tmp_path, monkeypatch):
+def test_an_interrupt_after_sampling_leaves_out_one_part_alone_and_figures_are_drawn_if_asked_for(
+    measured, tmp_path, monkeypatch
+):
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(module, "contour_band", interrupted)
+    (tmp_path / "contour.png").write_bytes(b"of a former run")
     seen = []
     options = {"rig": Rig(unknown="nothing"), "settings": QUICK, "figures": False, "rng": 1}
     run = analyse(measured, tmp_path, follow=seen.append, **options)
     assert list(run.left_out) == ["band"]
     assert seen[0].startswith("contact points")
     assert_every_file_is_there(run, tmp_path)
-
-
-def test_figures_are_left_out_where_none_are_asked_for(measured, tmp_path):
-    (tmp_path / "contour.png").write_bytes(b"of a former run")
-    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK, figures=False, rng=1)
     assert not set(FIGURES) & set(run.files)
-    assert not list(tmp_path.glob("*.png"))
-    assert not run.left_out
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -15,16 +15,14 @@ from tactile_bayes.checks import check_array, check_mapping, check_numbers, chec
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import axes_for, check_dataset, plot, write_instead
 from tactile_bayes.plotting.labels import (
-    LABELS,
     legend_above,
     legend_entries,
     legend_entry,
     number,
     percent,
-    set_unit,
     shown_unit,
 )
-from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, label_enlarged, outline
 from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
@@ -161,9 +159,7 @@ def band_detail(
         ax.plot(x, np.asarray(truth.height(x)) - median, **TRUTH)
     margin = 0.03 * float(np.ptp(x))
     ax.set_xlim(float(x.min()) - margin, float(x.max()) + margin)
-    attrs = band["lower"].attrs or band["x"].attrs
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, x)
-    set_unit(ax.yaxis, LABELS["contact_y"] + " − median ", "contact_y", attrs, np.concatenate([lower, upper]))
+    label_enlarged(ax, band["lower"].attrs or band["x"].attrs, x, np.concatenate([lower, upper]), "median")
     return ax
 
 
@@ -230,8 +226,7 @@ def overlaid(
     if reference is None:
         finish_map(ax, attrs)
         return ax
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, np.array(limits[:2]))
-    set_unit(ax.yaxis, f"{LABELS['contact_y']} − {reference.name} ", "contact_y", attrs, np.array(limits[2:]))
+    label_enlarged(ax, attrs, np.array(limits[:2]), np.array(limits[2:]), reference.name)
     legend_above(ax, min(4, len(legend_entries(ax))), legend_entries(ax))
     return ax
 
@@ -321,8 +316,7 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
     ax.set_xlim(outside[0], outside[-1])
     ax.set_ylim(low - _ROOM * (high - low), high + _ROOM * (high - low) + 0.1 * abs(low))
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, outside)
-    set_unit(ax.yaxis, LABELS["contact_y"] + " − chord ", "contact_y", attrs, drawn)
+    label_enlarged(ax, attrs, outside, drawn, "chord")
     legend_above(ax, 2, legend_entries(ax))
     return ax
 

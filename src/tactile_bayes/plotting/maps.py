@@ -45,6 +45,12 @@ def label_map(ax: Axes, attrs: Mapping[Any, Any], limits: Floats, form: str = "{
         set_unit(axis, f"{form.format(LABELS[name])} ", name, attrs, limits)
 
 
+def label_enlarged(ax: Axes, attrs: Mapping[Any, Any], x: Floats, y: Floats, against: str) -> None:
+    """Label the axes of heights that are measured from a line, each with its own unit."""
+    set_unit(ax.xaxis, f"{LABELS['contact_x']} ", "contact_x", attrs, x)
+    set_unit(ax.yaxis, f"{LABELS['contact_y']} − {against} ", "contact_y", attrs, y)
+
+
 def fit_height(ax: Axes) -> None:
     """Reduce the height of a figure with a single low map to that of the map, labels and legend."""
     left, right, bottom, top = limits_of(ax)

@@ -18,8 +18,9 @@ from tactile_bayes.report.wording import PageTable, fixed, is_direction, meaning
 from tactile_bayes.tasks.documents import read_json
 
 
-def background_of(findings: Findings) -> dict[str, PageTable | None]:
-    """Return the background tables by their names in the template."""
+def background_of(findings: Findings) -> dict[str, Any]:
+    """Return the background tables, and how to repeat the run, by their names in the template."""
+    attrs = findings.posterior.attrs
     return {
         "sweeps": _sweeps(findings),
         "priors": _priors(findings),
@@ -29,6 +30,9 @@ def background_of(findings: Findings) -> dict[str, PageTable | None]:
         "record_attributes": _statements(findings),
         "versions": _versions(findings),
         "hashes": _hashes(findings),
+        "command": shlex.join(read_json(attrs["command"], "command")) if "command" in attrs else "",
+        "python": python_lines(attrs),
+        "hindrances": hindrances(attrs),
     }
 
 
@@ -142,11 +146,6 @@ def _hashes(findings: Findings) -> PageTable:
 
 def _pairs(caption: str, rows: Mapping[str, Any], first: str, second: str = "value") -> PageTable:
     return PageTable(caption, [first, second], [[name, str(value)] for name, value in rows.items()], 2)
-
-
-def command_of(attrs: Mapping[Any, Any]) -> str:
-    """Return the shell command that made the run; "" if the posterior does not state it."""
-    return shlex.join(read_json(attrs["command"], "command")) if "command" in attrs else ""
 
 
 def python_lines(attrs: Mapping[Any, Any]) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.record import carried_sweeps, present_channels
-from tactile_bayes.report.background import background_of, command_of, hindrances, python_lines
+from tactile_bayes.report.background import background_of
 from tactile_bayes.report.contour_figure import contour_figure, gap_ends
 from tactile_bayes.report.findings import COMPARISON, Findings
 from tactile_bayes.report.overlay import note_of, overlay_table
@@ -66,9 +66,6 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "all_readings": PageTable("The readings", heads, readings.rows, 0),
         "everything": _parameters(findings, mute=False) if any(map(is_direction, parameters)) else None,
         "approximations": str(attrs.get("approximations", "")),
-        "command": command_of(attrs),
-        "python": python_lines(attrs),
-        "hindrances": hindrances(attrs),
         "data": {"band": contour.band, "frames": readings.data},
     }
 

@@ -6,6 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -140,7 +141,9 @@ def sensitivity_into(
     with Folder(out, SENSITIVITY) as folder:
         folder.write_netcdf("sensitivity", "sensitivity.nc", found)
         for part in found.children:
-            draw = _draw_noise_shares if part == "noise_shares" else getattr(plotting, part)
+            draw = getattr(plotting, part)
+            if part == "noise_shares":
+                draw = partial(_draw_both, draw, option="reconstruction", values=("raw", "constrained"))
             folder.draw(part, f"{part}.png", draw, found)
         words = [found.attrs["words"]]
         if material is not None:
@@ -155,7 +158,8 @@ def sensitivity_into(
         with Folder(folder.path / "study", STUDY) as inside:
             inside.files["cells"] = inside.path / CELLS.file
             inside.write_netcdf("study", "study.nc", studied)
-            inside.draw("errors", "study.png", _draw_study, studied)
+            draw = partial(_draw_both, plotting.error_map, option="quantity", values=("across", "touched"))
+            inside.draw("errors", "study.png", draw, studied)
         files |= inside.files
     return SensitivityRun(found, files, rods, studied)
 
@@ -198,15 +202,8 @@ def _rods(material: Material, options: Mapping[str, Any], progress: Callable[[Ta
     )
 
 
-def _draw_noise_shares(found: xr.DataTree) -> Axes:
-    """Draw the noise shares of both methods of Step 2."""
-    above, below = panels(2, 1, 7.0, 7.4)[:, 0]
-    plotting.noise_shares(found, reconstruction="raw", ax=above)
-    return plotting.noise_shares(found, reconstruction="constrained", ax=below)
-
-
-def _draw_study(studied: xr.Dataset) -> Axes:
-    """Draw the errors of contacts and the widths of bands."""
-    above, below = panels(2, 1, 7.0, 7.4)[:, 0]
-    plotting.error_map(studied, quantity="across", ax=above)
-    return plotting.error_map(studied, quantity="touched", ax=below)
+def _draw_both(plot: Callable[..., Axes], found: Any, *, option: str, values: tuple[str, str]) -> Axes:
+    """Draw a plot with one value of an option above, and with another below."""
+    for ax, value in zip(panels(2, 1, 7.0, 7.4)[:, 0], values, strict=True):
+        plot(found, ax=ax, **{option: value})
+    return ax

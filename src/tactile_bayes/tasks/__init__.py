@@ -20,15 +20,8 @@ from tactile_bayes.tasks.results_store import (
 from tactile_bayes.tasks.threads import in_parts, one_thread
 from tactile_bayes.tasks.workers import TaskProgress, Workers, run_tasks, workers_of
 
-__all__ = [
-    "FieldsAlone",
-    "Kind",
-    "ResultsStore",
-    "TaskProgress",
-    "Workers",
-    "alone_in",
-    "check_format",
-    "errors_of",
+__all__ = ["FieldsAlone", "Kind", "ResultsStore", "TaskProgress", "Workers", "alone_in", "check_format", "errors_of"]
+__all__ += [
     "in_parts",
     "is_temporary",
     "keep_outcomes",
@@ -36,8 +29,5 @@ __all__ = [
     "open_results_store",
     "refuse_replacing",
     "replace_together",
-    "run_tasks",
-    "versions_of",
-    "workers_of",
-    "write_atomically",
 ]
+__all__ += ["run_tasks", "versions_of", "workers_of", "write_atomically"]
