@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+import tactile_bayes as tb
 from tactile_bayes.cli.analysis import demo, infer
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.calibration import calibrate, calibrate_rig
@@ -129,9 +130,7 @@ def main() -> None:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from tactile_bayes import __version__
-
-        typer.echo(__version__)
+        typer.echo(tb.__version__)
         raise typer.Exit
 
 

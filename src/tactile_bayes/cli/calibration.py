@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
@@ -53,9 +54,7 @@ def calibrate(
     """
     import numpy as np
 
-    from tactile_bayes.rig import Rig
     from tactile_bayes.runs.verdicts import calibrate_into
-    from tactile_bayes.sweep import Rotation
 
     common = ctx.find_root().params
     common["debug"] = common["debug"] or debug
@@ -63,14 +62,14 @@ def calibrate(
     experiment: dict[str, Any] = {
         "family": family,
         "rig": rig.stated,
-        "drive": [Rotation(pivot, drive_angles=angles) for pivot in pivots_in(base)],
-        "truth": None if truth is None else Rig.read(truth),
+        "drive": [tb.Rotation(pivot, drive_angles=angles) for pivot in pivots_in(base)],
+        "truth": None if truth is None else tb.Rig.read(truth),
         "rng": seed,
     }
     if replicate is not None:
-        from tactile_bayes.calibration.calibrate import calibration_replicate
-
-        return _of_replicate(calibration_replicate(replicate, out=out, throw=common["debug"], **experiment))
+        return _of_replicate(
+            tb.calibration.calibration_replicate(replicate, out=out, throw=common["debug"], **experiment)
+        )
 
     with resumable_bar("replicate", output.is_silent, out, replicates) as note:
         run = calibrate_into(out, replicates=replicates, workers=work.reporting(note), **experiment)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output
 from tactile_bayes.errors import ParameterError
@@ -15,7 +16,6 @@ from tactile_bayes.errors import ParameterError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tactile_bayes.rig import Rig
     from tactile_bayes.rig.parameters import Parameter
 
 
@@ -31,7 +31,6 @@ def rig(
 
     Under [unknown] a number makes a parameter known, a distribution unknown, like friction = { half_normal = 0.3 }.
     """
-    from tactile_bayes.rig import Rig
     from tactile_bayes.rig.parameters import PARAMETERS
 
     if (path is None) != parameters:
@@ -39,7 +38,7 @@ def rig(
     if path is None:
         rows = [_row(parameter) for parameter in PARAMETERS.values()]
         return Answer(_listed(rows), lambda: {"parameters": rows})
-    stated = Rig.read(path)
+    stated = tb.Rig.read(path)
     said = _said(stated)
     return Answer(_words(stated, said), lambda: {"rig": stated.tables, "known": stated.known, "said": said})
 
@@ -109,7 +108,7 @@ def _default(parameter: Parameter) -> str:
     return f"{kind} {parameter.width:g} {unit}".strip()
 
 
-def _said(rig: Rig) -> dict[str, str]:
+def _said(rig: tb.Rig) -> dict[str, str]:
     """Return what is said of each parameter, as text: a number, a distribution, or that it has its default one."""
     from tactile_bayes.distributions import in_words
 
@@ -126,7 +125,7 @@ def _said(rig: Rig) -> dict[str, str]:
     return said | {name: f"calibrated, {in_words(prior)}" for name, prior in calibrated.items()}
 
 
-def _words(rig: Rig, said: dict[str, str]) -> Iterator[Any]:
+def _words(rig: tb.Rig, said: dict[str, str]) -> Iterator[Any]:
     rod, cell = rig.rod, rig.load_cell
     if rod is None:
         yield "rod         as the record states"

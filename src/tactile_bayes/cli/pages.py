@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.progress import resumable_bar, step_bar
@@ -92,9 +93,7 @@ def figures(
 
     Numbers are in units of the rod (L, EI/L, EI/L²). Noise is that of the loads in figure 11, by default none.
     """
-    from tactile_bayes.paper_figures import NUMBERS, caption, draw_all
     from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
-    from tactile_bayes.tasks import TaskProgress
 
     if (not noise.force_noise) != (not noise.moment_noise):
         raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
@@ -106,20 +105,20 @@ def figures(
         "rng": seed,
         "width": COLUMN_WIDTH if column else PAGE_WIDTH,
     }
-    numbers = list(dict.fromkeys(only or NUMBERS))
+    numbers = list(dict.fromkeys(only or tb.paper_figures.NUMBERS))
     count, then = len(numbers), "the same command draws all of them again"
     with resumable_bar("figure", output.is_silent, out, count, then=then) as note:
-        files = draw_all(
+        files = tb.paper_figures.draw_all(
             out,
             only=numbers,
             formats=format or ("pdf", "png"),
             style=style,
-            progress=lambda done: note(TaskProgress(done, count, done, 0.0)),
+            progress=lambda done: note(tb.tasks.TaskProgress(done, count, done, 0.0)),
             **options,
         )
     words, rows = list[str](), list[dict[str, Any]]()
     for number, of_formats in files.items():
-        text = caption(number, **options)
+        text = tb.paper_figures.caption(number, **options)
         words += [f"Figure {number}: {text}", *(f"    {path}" for path in of_formats.values())]
         rows.append({"number": number, "caption": text, "files": of_formats})
     return Answer(words, lambda: {"figures": rows})

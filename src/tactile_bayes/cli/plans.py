@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, step_bar
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.rig import Rig
     from tactile_bayes.runs.plans import Material, SensitivityRun
     from tactile_bayes.sweep import Carried, Drive
 
@@ -63,9 +63,7 @@ def design(
     """
     import numpy as np
 
-    from tactile_bayes.planning.design import usual_drives
     from tactile_bayes.runs.plans import design_into
-    from tactile_bayes.sweep import Rotation
 
     options: dict[str, Any] = {}
     known: xr.DataTree | str = family
@@ -77,10 +75,12 @@ def design(
         options = {"rig": rig.stated}
     steps = np.radians(drive_step or [2.0]).tolist()
     if base or carries.carry:
-        drives: list[Drive] = [Rotation(pivot, drive_step=step) for pivot in pivots_in(base) for step in steps if base]
+        drives: list[Drive] = [
+            tb.Rotation(pivot, drive_step=step) for pivot in pivots_in(base) for step in steps if base
+        ]
         drives += [_as_often(drive, step) for drive in carries.carried() for step in steps]
     else:
-        usual = [usual_drives(known, options.get("rig"), step) for step in steps]
+        usual = [tb.planning.usual_drives(known, options.get("rig"), step) for step in steps]
         drives = [drive for each in zip(*usual, strict=True) for drive in each]
 
     where = out / "nested" if nested else None
@@ -119,11 +119,10 @@ def _as_often(drive: Carried, step: float) -> Carried:
 
 
 def _posterior(run: Path) -> xr.DataTree:
-    from tactile_bayes.inference.result import read_result
     from tactile_bayes.runs.folder import posterior_in
 
     is_the_file = run.is_file() or (run.suffix == ".nc" and not run.exists())
-    return read_result(run if is_the_file else posterior_in(run))
+    return tb.read_result(run if is_the_file else posterior_in(run))
 
 
 def sensitivity(
@@ -167,26 +166,23 @@ def sensitivity(
 
     The same command resumes a stopped study.
     """
-    from tactile_bayes.contours import paper_profile
-    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.planning.family_parameters import enlarged
     from tactile_bayes.runs.plans import sensitivity_into, steps_of
-    from tactile_bayes.sweep import Rotation
 
     profiles, distances = profile or ["II"], distance or [0.5]
     if not replicates:
         _refuse_without_study(profiles, distances, noise_factor, work)
     stated = rig.stated
     for name in profiles:
-        paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
+        tb.contours.paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
     common: dict[str, Any] = {"rig": stated, "rng": seed}
-    drives = [Rotation(pivot, drive_step=math.radians(drive_step)) for pivot in pivots_in(base)]
+    drives = [tb.Rotation(pivot, drive_step=math.radians(drive_step)) for pivot in pivots_in(base)]
     material = _material(stated) if best_rod else None
     first: Any = profiles[0]
     analysis = {
         **common,
         "material": material,
-        "contour": enlarged(paper_profile(first, q=distances[0]), (stated.rod or Rod()).length),
+        "contour": enlarged(tb.contours.paper_profile(first, q=distances[0]), (stated.rod or tb.Rod()).length),
         "drive": drives,
         "band_widths": band_width or None,
     }
@@ -224,7 +220,7 @@ def _refuse_without_study(
             raise ParameterError(f"{option} is for a study: give --replicates as well, like --replicates 20")
 
 
-def _material(rig: Rig) -> Material:
+def _material(rig: tb.Rig) -> Material:
     """Return the material of a rig's rod, of Young's modulus EI / (π d⁴ / 64)."""
     from tactile_bayes.mechanics.rods.rod import round_rigidity
     from tactile_bayes.runs.plans import Material

@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import tactile_bayes as tb
+
 if TYPE_CHECKING:
     from pathlib import Path
 
     from tactile_bayes.inference.ensembles import Progress
-    from tactile_bayes.tasks import TaskProgress, Workers
 
 _GOAL = 1000.0  # effective sample size at which sampling stops, as in `SamplerSettings`
 _MAX_R_HAT = 1.01  # R̂ below which sampling stops, as in `SamplerSettings`
@@ -37,12 +38,11 @@ class WorkerOptions:
         "tcp://10.0.0.1:8786.",
     ] = None
 
-    def reporting(self, progress: Callable[[TaskProgress], object]) -> Workers:
+    def reporting(self, progress: Callable[[tb.tasks.TaskProgress], object]) -> tb.tasks.Workers:
         """Return the workers, of which a function hears."""
-        from tactile_bayes.tasks import Workers
 
         where = self.workers
-        return Workers(int(where) if where is not None and where.isdecimal() else where, progress)
+        return tb.tasks.Workers(int(where) if where is not None and where.isdecimal() else where, progress)
 
 
 @contextmanager
@@ -53,12 +53,12 @@ def resumable_bar(
     total: int | None = None,
     *,
     then: str = "the same command resumes",
-) -> Iterator[Callable[[TaskProgress], object]]:
+) -> Iterator[Callable[[tb.tasks.TaskProgress], object]]:
     """Show a bar, and yield a function that takes the progress of tasks.
 
     At an interrupt, report how many are in a folder, or that nothing was written, and what the same command then does.
     """
-    last: TaskProgress | None = None
+    last: tb.tasks.TaskProgress | None = None
 
     def have() -> str:
         if where is None:
@@ -70,7 +70,7 @@ def resumable_bar(
     at_first = "beginning" if total is None else f"{counted(total, noun)} to be made"
     with resumable(have, then) as raise_lost, step_bar(quiet, noun, at_first) as show:
 
-        def note(progress: TaskProgress) -> None:
+        def note(progress: tb.tasks.TaskProgress) -> None:
             nonlocal last
             last = progress
             show(progress.done, progress.wanted)

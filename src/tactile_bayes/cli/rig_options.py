@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.command import Reads
 from tactile_bayes.errors import ParameterError, TactileBayesError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.rig import Rig
 
 Record = Annotated[Path, "Record, .csv or .nc, or a bag of ROS.", typer.Argument()]
 
@@ -51,11 +50,10 @@ class RigFile:
     ] = None
 
     @property
-    def stated(self) -> Rig:
+    def stated(self) -> tb.Rig:
         """The rig as file and options state it, apart from its noise; without a file, one that says nothing."""
-        from tactile_bayes.rig import Rig
 
-        return Rig() if self.rig is None else Rig.read(self.rig)
+        return tb.Rig() if self.rig is None else tb.Rig.read(self.rig)
 
 
 def report_units(record: xr.Dataset) -> None:
@@ -77,13 +75,12 @@ class NoiseOptions:
     ] = None
     moment_noise: Annotated[float | None, "Standard deviation of the moment [N m, or EI/L]; likewise."] = None
 
-    def in_place_of(self, cell: LoadCell | None) -> LoadCell | None:
+    def in_place_of(self, cell: tb.LoadCell | None) -> tb.LoadCell | None:
         """Return a load cell with the noise that is given."""
-        from tactile_bayes.load_cell import LoadCell
 
         names = ("force_noise", "moment_noise")
         noise = {name: value for name in names if (value := getattr(self, name)) is not None}
-        return replace(cell or LoadCell(), **noise) if noise else cell
+        return replace(cell or tb.LoadCell(), **noise) if noise else cell
 
 
 @dataclass(frozen=True)
@@ -95,9 +92,8 @@ class RigOptions(NoiseOptions, RigFile):
     diameter: Annotated[float | None, "Rod diameter [m], at the base; likewise."] = None
 
     @property
-    def stated(self) -> Rig:
+    def stated(self) -> tb.Rig:
         """The rig as file and options state it, apart from its noise."""
-        from tactile_bayes.mechanics.rods.rod import Rod
 
         rig = super().stated
         named = ((name, getattr(self, name)) for name in ("length", "flexural_rigidity", "diameter"))
@@ -112,22 +108,19 @@ class RigOptions(NoiseOptions, RigFile):
                 )
             if self.length is None:
                 raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
-        return replace(rig, rod=replace(rig.rod or Rod(), **given))
+        return replace(rig, rod=replace(rig.rod or tb.Rod(), **given))
 
-    def read(self, path: Path) -> tuple[xr.Dataset, Rig]:
+    def read(self, path: Path) -> tuple[xr.Dataset, tb.Rig]:
         """Read a record, and return it with its rig and the noise that is given; report assumed units."""
-        from tactile_bayes.load_cell import LoadCell
-        from tactile_bayes.record import present_channels
-        from tactile_bayes.rig import read_record
 
         stated = self.stated
-        record, rig = read_record(path, stated), stated.without_bare_cell
+        record, rig = tb.read_record(path, stated), stated.without_bare_cell
         report_units(record)
         if self.force_noise is None and self.moment_noise is None:
             return record, rig
-        cell = self.in_place_of(rig.load_cell or LoadCell.from_record(record))
+        cell = self.in_place_of(rig.load_cell or tb.LoadCell.from_record(record))
         assert cell is not None
-        bare = [name for name in present_channels(record) if not cell.standard_deviations[name]]
+        bare = [name for name in tb.record.present_channels(record) if not cell.standard_deviations[name]]
         if bare:
             option = "--moment-noise" if "holding_moment" in bare else "--force-noise"
             raise ParameterError(

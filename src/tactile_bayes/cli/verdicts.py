@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, sampling_bar
@@ -44,7 +45,6 @@ def compare(
 ) -> Answer:
     """Compare shapes of contours for a measured record: the probability of each, and whether any fits."""
     from tactile_bayes.comparison.families import SHAPES
-    from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.verdicts import compare_into
 
     measured, of_record = rig.read(record)
@@ -56,7 +56,7 @@ def compare(
             rig=of_record,
             leave_one_out=leave_one_out,
             rng=seed,
-            settings=SamplerSettings(max_seconds=max_seconds),
+            settings=tb.SamplerSettings(max_seconds=max_seconds),
             progress=lambda name, progress: show and show(progress, name),
         )
     found = run.result
