@@ -47,7 +47,7 @@ from tactile_bayes.report.findings import findings_of
 from tactile_bayes.report.page import page_of
 from tactile_bayes.report.readings_figure import motion_of, readings_figure
 from tactile_bayes.report.trust import contacts_messages
-from tactile_bayes.runs.reconstruction import reconstruction_messages
+from tactile_bayes.runs.readings import reconstruction_messages
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 COMMAND = ["tactile-bayes", "infer", "measured.csv", "--rig", "rig.toml", "--out", "my run"]

@@ -15,7 +15,7 @@ import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.progress import acknowledge_interrupt, resumable_bar, sampling_bar
-from tactile_bayes.cli.rig_options import RigOptions
+from tactile_bayes.cli.rigs import RigOptions
 from tactile_bayes.runs.names import CHECKPOINT, INFERENCE, MANY, OF_POSTERIOR, WATCH_PAGE
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, sampling_bar
-from tactile_bayes.cli.rig_options import RigFile, RigOptions
+from tactile_bayes.cli.rigs import RigFile, RigOptions
 from tactile_bayes.cli.scan_options import GaugeOptions, Pivots, pivots_in
 from tactile_bayes.runs.names import CALIBRATION, RIG
 

@@ -14,7 +14,7 @@ from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Out, Output, Writes
 from tactile_bayes.cli.numbers import assigned
 from tactile_bayes.cli.progress import step_bar
-from tactile_bayes.cli.rig_options import Record, RigOptions
+from tactile_bayes.cli.rigs import Record, RigOptions
 from tactile_bayes.errors import RecordWarning
 from tactile_bayes.runs.names import INSPECTION, RECONSTRUCTION
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.runs.reconstruction import ReconstructionRun
+    from tactile_bayes.runs.readings import ReconstructionRun
 
 _SOURCES = {
     "given": "as rig.toml and options say",
@@ -100,7 +100,7 @@ def inspect(
         contents = [*_contents(found, of_record.format.columns), *texts]
         files: Mapping[str, Path] = {}
         if out is not None:
-            from tactile_bayes.runs.inspection import write_inspection
+            from tactile_bayes.runs.readings import write_inspection
 
             if of_record.load_cell is None:  # the frame is stated without one, too
                 of_record = replace(of_record, load_cell=rig.stated.load_cell)
@@ -301,7 +301,7 @@ def reconstruct(
     estimated from the samples before first contact and after snap-off.
     """
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_messages
+        from tactile_bayes.runs.readings import reconstruct_into, reconstruction_messages
 
         measured, of_record = rig.read(record)
         show(1, 2)

@@ -11,7 +11,7 @@ import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.progress import resumable_bar, step_bar
-from tactile_bayes.cli.rig_options import NoiseOptions
+from tactile_bayes.cli.rigs import NoiseOptions
 from tactile_bayes.cli.scan_options import rotation_step
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.runs.names import FIGURES

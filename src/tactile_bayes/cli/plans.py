@@ -13,7 +13,7 @@ import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, step_bar
-from tactile_bayes.cli.rig_options import RigFile
+from tactile_bayes.cli.rigs import RigFile
 from tactile_bayes.cli.scan_options import CarryOptions, Pivots, pivots_in
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.runs.names import DESIGN, SENSITIVITY

@@ -13,7 +13,7 @@ import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output, Seed, Writes
 from tactile_bayes.cli.progress import step_bar
-from tactile_bayes.cli.rig_options import NoiseOptions, RigFile
+from tactile_bayes.cli.rigs import NoiseOptions, RigFile
 from tactile_bayes.cli.scan_options import ContourOptions, Directions, DriveOptions, Pivots
 from tactile_bayes.errors import ParameterError
 

@@ -11,7 +11,7 @@ import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, sampling_bar
-from tactile_bayes.cli.rig_options import Record, RigOptions
+from tactile_bayes.cli.rigs import Record, RigOptions
 from tactile_bayes.runs.names import COMPARISON, TRUST
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from tactile_bayes.cli.answer import Answer, columns_of, print_object
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.progress import acknowledge_interrupt
-from tactile_bayes.cli.rig_options import RigFile, report_units
+from tactile_bayes.cli.rigs import RigFile, report_units
 from tactile_bayes.errors import InferenceError, ParameterError, TactileBayesError
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH, WATCH_PAGE
 
