@@ -12,13 +12,12 @@ from tactile_bayes.plotting.contacts import contact_ellipses, contact_regions, t
 from tactile_bayes.plotting.contour_map import band_detail, contour, gap, overlaid
 from tactile_bayes.plotting.design_map import design
 from tactile_bayes.plotting.inspection_panels import inspection
-from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.reach_map import posterior_contours, prior_contours
 from tactile_bayes.plotting.records import observables, predictive
 from tactile_bayes.plotting.requirements import error_map, required_noise, required_rod
 from tactile_bayes.plotting.scan_maps import rods, touched
-from tactile_bayes.plotting.style import style
+from tactile_bayes.plotting.style import PALETTE, style
 from tactile_bayes.plotting.sweep_plans import amplification, information, noise_shares
 
 __all__ = ["PALETTE", "amplification", "assumptions", "band_detail", "calibration_ranks", "contact_ellipses"]

@@ -10,7 +10,7 @@ import xarray as xr
 
 from tactile_bayes.plotting.axes import AxesArray, axes_for, check_dataset, check_panels, label_rows, new_panels, plot
 from tactile_bayes.plotting.labels import legend, number, show_numbers
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

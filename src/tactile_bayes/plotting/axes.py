@@ -14,7 +14,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers, check_optional, refused
 from tactile_bayes.contours.base import check_single
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

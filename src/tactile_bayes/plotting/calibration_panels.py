@@ -21,7 +21,7 @@ from tactile_bayes.plotting.axes import (
     write_instead,
 )
 from tactile_bayes.plotting.labels import number, percent
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

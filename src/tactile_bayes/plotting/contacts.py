@@ -16,7 +16,7 @@ from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.plotting.axes import AxesArray, axes_for, check_drawing, check_panels, checked_samples, plot
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, legend_above, legend_entry, percent, show_numbers
 from tactile_bayes.plotting.maps import finish_map, fit_height, label_map, limits_of, outline
-from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, TRUTH
+from tactile_bayes.plotting.style import PALETTE, PHASES, SWEEP_LINES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

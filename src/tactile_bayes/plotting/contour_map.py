@@ -23,7 +23,7 @@ from tactile_bayes.plotting.labels import (
     shown_unit,
 )
 from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, label_enlarged, outline
-from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES, TRUTH
+from tactile_bayes.plotting.style import BASES, CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.axes import axes_for, check_dataset, label_rows, plot, tile_edges
 from tactile_bayes.plotting.labels import legend, legend_above, legend_entry, number, show_numbers, shown_unit
 from tactile_bayes.plotting.maps import draw_pivot, label_map
-from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
+from tactile_bayes.plotting.style import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

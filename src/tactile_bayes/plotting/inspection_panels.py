@@ -10,7 +10,7 @@ from tactile_bayes.checks import check_kind
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, plot, write_not_measured
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis, finish_channels, reading_style
 from tactile_bayes.plotting.labels import LABELS, legend_entry, set_unit
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 from tactile_bayes.record import CHANNELS, present_channels
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.labels import LABELS, legend, legend_above, legend_entries, set_unit
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     import xarray as xr

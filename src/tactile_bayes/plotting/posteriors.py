@@ -14,7 +14,7 @@ from tactile_bayes.checks import check_kind, check_mapping, check_names, check_n
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, plot
 from tactile_bayes.plotting.labels import number
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,7 +14,7 @@ from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.plotting.axes import axes_for, plot
 from tactile_bayes.plotting.labels import legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
-from tactile_bayes.plotting.marks import PALETTE, TRUTH
+from tactile_bayes.plotting.style import PALETTE, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

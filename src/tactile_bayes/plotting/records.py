@@ -20,7 +20,7 @@ from tactile_bayes.plotting.drive_axis import (
     with_events,
 )
 from tactile_bayes.plotting.labels import LABELS, legend_entry, set_unit
-from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
+from tactile_bayes.plotting.style import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
 from tactile_bayes.record import CHANNELS, frame_of, validate
 from tactile_bayes.sweep import SweepEvents
 

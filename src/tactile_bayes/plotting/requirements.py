@@ -22,7 +22,7 @@ from tactile_bayes.plotting.labels import (
     show_numbers,
     shown_unit,
 )
-from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
+from tactile_bayes.plotting.style import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from tactile_bayes.plotting import maps
 from tactile_bayes.plotting.axes import axes_for, plot
 from tactile_bayes.plotting.drive_axis import ENDINGS
 from tactile_bayes.plotting.labels import legend_entry, number, shown_unit
-from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES
+from tactile_bayes.plotting.style import BASES, CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.sweep import Scan
 

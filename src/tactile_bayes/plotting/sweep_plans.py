@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import refused
 from tactile_bayes.plotting.axes import axes_for, check_among, group_of, plot
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, legend_above, legend_entry, number, set_log_scale
-from tactile_bayes.plotting.marks import BASES, SWEEP_LINES
+from tactile_bayes.plotting.style import BASES, SWEEP_LINES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
