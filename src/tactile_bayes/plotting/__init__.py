@@ -11,10 +11,9 @@ from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverag
 from tactile_bayes.plotting.contacts import contact_ellipses, contact_regions, tightening
 from tactile_bayes.plotting.contour_map import band_detail, contour, gap, overlaid
 from tactile_bayes.plotting.design_map import design
-from tactile_bayes.plotting.inspection_panels import inspection
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.reach_map import posterior_contours, prior_contours
-from tactile_bayes.plotting.records import observables, predictive
+from tactile_bayes.plotting.records import inspection, observables, predictive
 from tactile_bayes.plotting.requirements import error_map, required_noise, required_rod
 from tactile_bayes.plotting.scan_maps import rods, touched
 from tactile_bayes.plotting.style import PALETTE, style
