@@ -33,6 +33,7 @@ _MADE = {
 >>> cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 >>> measured = cell.measure(scanned.record, rng=1)""",
     "inferred": """
+>>> from matplotlib.figure import Figure
 >>> stated, quick = tb.Rig(unknown="nothing"), tb.SamplerSettings(min_ess=100, max_r_hat=1.1)
 >>> inferred = tb.infer_contour(measured, rig=stated, rng=1, settings=quick)""",
 }

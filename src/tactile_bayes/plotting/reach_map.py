@@ -55,7 +55,7 @@ def prior_contours(
 
     Examples
     --------
-    >>> prior_contours(inferred).get_ylabel()
+    >>> prior_contours(inferred, ax=Figure().subplots()).get_ylabel()
     '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of
@@ -90,7 +90,7 @@ def posterior_contours(
 
     Examples
     --------
-    >>> posterior_contours(inferred).get_ylabel()
+    >>> posterior_contours(inferred, ax=Figure().subplots()).get_ylabel()
     '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of
