@@ -24,12 +24,20 @@ from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.plotting.axes import AxesArray
 from tactile_bayes.plotting.drive_axis import EVENT_MARKERS, draw_events, phase_runs, with_events
-from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
-from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_in_rows
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, legend_entries, legend_entry, legend_in_rows, set_unit
 from tactile_bayes.plotting.maps import draw_object, draw_pivot, label_map, outline
-from tactile_bayes.plotting.marks import BASES, PALETTE, PHASES, SWEEP_MARKERS
 from tactile_bayes.plotting.scan_maps import rods as draw_rods
-from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH, Style, own_style, save_figure
+from tactile_bayes.plotting.style import (
+    BASES,
+    COLUMN_WIDTH,
+    PAGE_WIDTH,
+    PALETTE,
+    PHASES,
+    SWEEP_MARKERS,
+    Style,
+    own_style,
+    save_figure,
+)
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.rig import Rig

@@ -208,7 +208,7 @@ def test_a_refusal_shows_where_it_comes_from_if_asked(tmp_path):
 
 @pytest.mark.parametrize("debug", [False, True])
 def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_path, monkeypatch, debug):
-    from tactile_bayes.runs import reconstruction as reconstruction_run
+    from tactile_bayes.runs import readings as reconstruction_run
 
     def broken(*arguments, **options):
         raise ZeroDivisionError("float division by zero\nand more")

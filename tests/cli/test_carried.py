@@ -14,8 +14,8 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.plotting.drive_axis import drive_axis
 from tactile_bayes.report.findings import findings_of
-from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.page import page_of
+from tactile_bayes.report.readings_figure import motion_of
 
 CIRCLE = ["--family", "circle", "--parameter", "r=0.3", "--parameter", "q=0.8"]
 CARRY = ["--carry", "0.8,0,180,68.75,1.6", *CIRCLE]

@@ -10,10 +10,11 @@ import pandas as pd
 import pytest
 
 import tactile_bayes as tb
-from helpers.commands import answered, assert_refused, call, succeed
+from helpers.commands import answered, assert_files, assert_refused, call, succeed
 from tactile_bayes.record import CHANNELS, write_record
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.runs.names import INSPECTION
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -79,14 +80,12 @@ def test_what_looks_wrong_comes_first_then_what_is_in_the_file(inspected, rig):
 def test_the_folder_holds_words_tables_and_a_picture(inspected):
     result, folder = inspected
     assert (folder / "inspection.txt").read_text(encoding="utf-8").startswith("Nothing looks wrong.\n\nsamples ")
-    assert (folder / "inspection.png").read_bytes().startswith(b"\x89PNG\r\n")
     samples = pd.read_csv(folder / "samples.csv", index_col="sample")
     assert len(samples) == 198
     assert samples[[name for name in samples if name.startswith(("outlier", "stuck", "cut_off"))]].to_numpy().sum() == 0
     assert pd.read_csv(folder / "sweeps.csv", index_col="sweep")["snap_off_before"].notna().all()
     assert pd.read_csv(folder / "channels.csv", index_col="channel").loc["force_x", "unit"] == "N"
-    listed = [line.split(maxsplit=1)[1] for line in result.stdout.split("\n\n")[-2].splitlines()]
-    assert sorted(listed) == sorted(str(path) for path in folder.iterdir())
+    assert_files(result, folder, INSPECTION, block=-2)
 
 
 def test_without_a_folder_the_next_command_writes_what_the_options_say(rig, record):

@@ -5,11 +5,9 @@ from functools import partial
 
 import pytest
 
+import tactile_bayes as tb
 from helpers import commands
 from helpers.report_pages import Page, analysed_quickly, coarse_record
-from tactile_bayes.inference.result import read_result
-from tactile_bayes.record import write_record
-from tactile_bayes.rig import Rig
 from tactile_bayes.uncertainty import contour_band, overlay_distance, read_overlay
 from tactile_bayes.uncertainty.rod_reach import reach
 
@@ -21,7 +19,7 @@ succeed = partial(commands.succeed, "report")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cli") / "run"
-    analysed_quickly(coarse_record(), folder, rig=Rig(unknown="nothing"))
+    analysed_quickly(coarse_record(), folder, rig=tb.Rig(unknown="nothing"))
     return folder
 
 
@@ -40,7 +38,7 @@ def test_it_writes_the_page_into_the_run_or_where_it_is_told(folder, tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_infer_states_its_file_and_its_words(as_stated, tmp_path):
     path, out = tmp_path / "my record.csv", tmp_path / "run"
-    write_record(coarse_record(), path)
+    tb.write_record(coarse_record(), path)
     words = ["infer", str(path), "--rig", str(as_stated), "--out", str(out), "--quiet"]
     assert commands.call(*words).exit_code == 0
     assert call(out).exit_code == 0
@@ -56,7 +54,7 @@ def test_a_contour_is_laid_over_it_and_drawn_beside_the_page(folder, tmp_path):
     figure = tmp_path / "overlay.png"
     said = answered(folder, "--overlay", points, "--out", tmp_path / "page.html")["overlay"]
     assert said["figure"] == str(figure)
-    posterior = read_result(folder / "posterior.nc")
+    posterior = tb.read_result(folder / "posterior.nc")
     band = contour_band(posterior, reach(posterior), 0.95)
     exact = overlay_distance(band, read_overlay(points, posterior))
     assert said["distances"][folder.name] == pytest.approx(exact._asdict())

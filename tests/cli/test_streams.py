@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tactile_bayes.cli import app
-from tactile_bayes.cli.streams import accept_every_text
+from tactile_bayes.cli.app import accept_every_text
 
 ENCODINGS = ["ascii", "cp1252", "cp437", "latin-1", "koi8-r", "shift_jis", "utf-8"]
 

@@ -12,19 +12,14 @@ from functools import partial
 import numpy as np
 import pytest
 
+import tactile_bayes as tb
 from helpers import commands
 from helpers.report_pages import Page
 from tactile_bayes.cli import watching
 from tactile_bayes.contours import paper_profile
-from tactile_bayes.diagnostics import check
-from tactile_bayes.inference.result import read_result
-from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell, RandomWalk
-from tactile_bayes.record import write_record
-from tactile_bayes.rig import Rig, read_record
 from tactile_bayes.runs import watch
 from tactile_bayes.runs.watch import open_watch
-from tactile_bayes.sweep import scan
 
 FEW = ("--particles", 120)
 
@@ -81,7 +76,7 @@ def objects(result):
 
 def streamed(*parts):
     """Medians of a stream that is given these parts of a record one after the other."""
-    stream = Stream(rig=Rig(unknown="nothing"), rng=1, particles=120)
+    stream = tb.Stream(rig=tb.Rig(unknown="nothing"), rng=1, particles=120)
     for part in parts:
         stream.update(part)
     return [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
@@ -102,7 +97,7 @@ def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, follow, rows,
     assert said[8].startswith("All is well: the particles ")
     folder = path.parent / "run"
     assert {"stream.nc", "posterior.nc", "band.csv", "summary.txt", "watch.html"} <= set(os.listdir(folder))
-    posterior = read_result(folder / "posterior.nc")
+    posterior = tb.read_result(folder / "posterior.nc")
     assert posterior.attrs["sampler"] == "sequential Monte Carlo"
     assert posterior.attrs["record_file"] == "live.csv"
     assert posterior["observed_data"].sizes["sample"] == 130
@@ -150,7 +145,7 @@ def test_each_update_is_a_line_for_programs(path, lines, follow, rows, measure):
     assert one["warnings"] == []
     assert warning in result.stderr
     assert (end["reason"], end["samples_taken"], end["converged"]) == ("no new rows for 0 s", 49, True)
-    assert end["words"][0] == check(read_result(path.parent / "run" / "posterior.nc")).messages[0]
+    assert end["words"][0] == tb.check(tb.read_result(path.parent / "run" / "posterior.nc")).messages[0]
 
 
 @pytest.mark.slow
@@ -171,7 +166,7 @@ def test_the_same_command_goes_on_with_the_same_numbers(path, follow, rows, meas
     resumed, grown, _ = objects(follow(json=True))
     assert (resumed["samples"], resumed["new"]) == (30, 0)
     assert resumed["quantities"] == objects(first)[0]["quantities"]
-    measured = read_record(path)
+    measured = tb.read_record(path)
     expected = streamed(measured.isel(sample=slice(0, 30)), measured.isel(sample=slice(30, None)))
     assert [row["median"] for row in grown["quantities"]] == pytest.approx(expected, rel=1e-12)
     assert follow().stdout.startswith("60 samples, resumed; ")
@@ -198,10 +193,10 @@ def test_of_a_long_record_every_other_sample_is_taken(path, follow, rows, measur
     assert (thinned["samples"], thinned["new"], thinned["every"]) == (half, half, 2)
     assert not thinned["restarted"]
     assert any("one sample of 2" in words for words in thinned["warnings"])
-    expected = streamed(read_record(path).isel(sample=slice(None, None, 2)))
+    expected = streamed(tb.read_record(path).isel(sample=slice(None, None, 2)))
     assert [row["median"] for row in thinned["quantities"]] == pytest.approx(expected, rel=1e-12)
     assert end["samples_taken"] == half
-    assert read_result(path.parent / "run" / "posterior.nc").attrs["samples_taken_every"] == 2
+    assert tb.read_result(path.parent / "run" / "posterior.nc").attrs["samples_taken_every"] == 2
     again, *_ = objects(follow(*some, json=True))
     assert (again["samples"], again["new"], again["every"]) == (half, 0, 2)
     said = follow(*some).stdout
@@ -213,11 +208,11 @@ def test_of_a_long_record_every_other_sample_is_taken(path, follow, rows, measur
 @pytest.mark.slow
 def test_samples_of_a_load_cell_that_drifts_are_all_taken(record, tmp_path):
     """The steps of its drift are those from one sample to the next; of another cell every other sample is taken."""
-    measured = read_record(record)
+    measured = tb.read_record(record)
     steady = LoadCell.from_record(measured)
     size, options = measured.sizes["sample"], {"record_file": record, "rng": 1, "particles": 100}
     for cell, every in ((steady, 2), (replace(steady, drift=RandomWalk(force=1e-4)), 1)):
-        rig = Rig(load_cell=cell, unknown="nothing")
+        rig = tb.Rig(load_cell=cell, unknown="nothing")
         with open_watch(tmp_path / f"run {every}", most_samples=100, rig=rig, **options) as watched:
             update = watched.take(measured, "")
         assert (update.samples, update.every) == (-(-size // every), every)
@@ -266,9 +261,9 @@ def test_a_wrong_model_is_told_once(path, follow, tmp_path):
     """Friction that is not inferred."""
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     record = cell.measure(
-        scan(paper_profile("II", q=0.5), drive_step=0.05, rig=Rig(unknown={"friction": 0.2})).record, rng=1
+        tb.scan(paper_profile("II", q=0.5), drive_step=0.05, rig=tb.Rig(unknown={"friction": 0.2})).record, rng=1
     )
-    write_record(record.isel(sample=slice(0, 60)), tmp_path / "whole.csv")
+    tb.write_record(record.isel(sample=slice(0, 60)), tmp_path / "whole.csv")
     text = (tmp_path / "whole.csv").read_text(encoding="utf-8").splitlines(keepends=True)
 
     def leave(count):

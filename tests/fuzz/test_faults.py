@@ -37,7 +37,7 @@ from tactile_bayes.record import write_record
 from tactile_bayes.report import writing
 from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.rig.rig_prior import RigPrior
-from tactile_bayes.runs import comparison, contour, inspection, names, rig
+from tactile_bayes.runs import contour, names, readings, rig, verdicts
 from tactile_bayes.runs.folder import Folder
 from tactile_bayes.tasks import Kind, is_temporary, open_results_store
 
@@ -155,8 +155,8 @@ WRITERS = {
     "checkpoint": write_states,
     "data set": lambda folder, k: datasets.generate(SPEC, folder, workers=1) if k else None,
     "infer": write_run,
-    "inspect": lambda folder, k: inspection.write_inspection(INSPECTIONS[k], folder, rig=Rig()),
-    "compare": lambda folder, k: comparison.write_comparison(data(k), folder),
+    "inspect": lambda folder, k: readings.write_inspection(INSPECTIONS[k], folder, rig=Rig()),
+    "compare": lambda folder, k: verdicts.write_comparison(data(k), folder),
     "calibrate-rig": lambda folder, k: rig.calibrate_rig_into(
         folder, [(None, None)], contour=Parabola(0.5, 0.5), rig=Rig()
     ),

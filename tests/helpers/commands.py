@@ -26,6 +26,15 @@ def answered(*arguments):
     return json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
+def assert_files(result, folder, names, block=-1):
+    """A block of what is printed lists the files in a folder, which have these names; pictures are PNG."""
+    listed = [line.split(maxsplit=1)[1] for line in result.stdout.split("\n\n")[block].splitlines()]
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    assert sorted(listed) == sorted(map(str, files))
+    assert {path.name for path in files} == set(names)
+    assert all(path.read_bytes().startswith(b"\x89PNG\r\n") for path in files if path.suffix == ".png")
+
+
 def assert_refused(result, *fragments):
     """Exit code 2, a line on stderr with these fragments, and nothing else."""
     assert result.exit_code == 2, result.output

@@ -14,7 +14,7 @@ from tactile_bayes import Rig
 from tactile_bayes.inference.experiment import Experiment, found_rig
 from tactile_bayes.inference.family import Gauge
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.report.frames import motion_of
+from tactile_bayes.report.readings_figure import motion_of
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 

@@ -20,7 +20,7 @@ from tactile_bayes.inference.evidence import contour_evidence
 from tactile_bayes.inference.experiment import points_of
 from tactile_bayes.inference.target import Target
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.report.reproduction import hindrances
+from tactile_bayes.report.background import hindrances
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.rig_prior import RigPrior
 

@@ -6,16 +6,13 @@ from matplotlib import colors
 from matplotlib import pyplot as plt
 from matplotlib.patches import Ellipse
 
+import tactile_bayes as tb
 from helpers.contact_posteriors import CELL, SI_CELL, measured
 from helpers.pictures import labels, own_axes
 from helpers.refusals import refused
-from tactile_bayes import plotting
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.plotting import contact_ellipses, contact_regions
-from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.rig import Rig
 from tactile_bayes.uncertainty.contact_region import contact_region
 
 SOME = np.array([2, 22, 24, 30, 45, 61, 120])
@@ -23,12 +20,12 @@ SOME = np.array([2, 22, 24, 30, 45, 61, 120])
 
 @pytest.fixture(scope="module")
 def posterior():
-    return infer_contacts(measured().isel(sample=SOME), rig=Rig(load_cell=CELL), rng=1, draws=400)
+    return tb.infer_contacts(measured().isel(sample=SOME), rig=tb.Rig(load_cell=CELL), rng=1, draws=400)
 
 
 @pytest.fixture(scope="module")
 def contacts():
-    return reconstruct(measured(), method="constrained", rig=Rig(load_cell=CELL))
+    return tb.reconstruct(measured(), method="constrained", rig=tb.Rig(load_cell=CELL))
 
 
 def outlines(ax):
@@ -51,7 +48,7 @@ def test_ellipses_are_those_of_the_covariance(contacts):
         off = rim - [float(at.contact_x), float(at.contact_y)]
         np.testing.assert_allclose(np.einsum("ni,ij,nj->n", off, precision, off), 2.0 * np.log(10.0), rtol=1e-6)
         phase = str(at.contact_phase.values)
-        assert colors.to_hex(ellipse.get_edgecolor()) == colors.to_hex(plotting.PALETTE[phase])
+        assert colors.to_hex(ellipse.get_edgecolor()) == colors.to_hex(tb.plotting.PALETTE[phase])
 
 
 def test_regions_are_outlined_at_their_level(posterior):
@@ -70,7 +67,7 @@ def test_labels_say_probability_phase_and_unit(contacts, posterior):
     ax = contact_regions(posterior, probability=0.95, truth=paper_profile("II", q=0.5), ax=own_axes())
     assert labels(ax)[:2] == ["95 % region, tip contact", "95 % region, tangential contact"]
     assert ax.get_aspect() == 1.0
-    in_si = reconstruct(measured("SI"), method="constrained", rig=Rig(load_cell=SI_CELL))
+    in_si = tb.reconstruct(measured("SI"), method="constrained", rig=tb.Rig(load_cell=SI_CELL))
     assert "m]" in contact_ellipses(in_si, ax=own_axes()).get_xlabel()
 
 

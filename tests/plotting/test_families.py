@@ -4,24 +4,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import tactile_bayes as tb
 from helpers.comparisons import made_up
-from helpers.pictures import labels, own_axes, row_labels, texts
-from helpers.refusals import refused
-from tactile_bayes import plotting
+from helpers.pictures import labels, row_labels, texts
 from tactile_bayes.comparison.families import NONE_FITS
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, ROD
 
-BRIEF = SamplerSettings(ensembles=2, max_steps=20)
+BRIEF = tb.SamplerSettings(ensembles=2, max_steps=20)
 
 
 @pytest.fixture(scope="module")
 def posterior(measured):
-    return infer_contour(measured, family="parabola", rig=Rig(unknown="nothing"), rng=1, settings=BRIEF)
+    return tb.infer_contour(measured, family="parabola", rig=tb.Rig(unknown="nothing"), rng=1, settings=BRIEF)
 
 
 def title(ax):
@@ -39,7 +34,7 @@ def line(ax, label):
 def test_bars_are_probabilities_and_markers_those_of_other_priors():
     half, twice = [0.2, 0.5, 0.3], [0.05, 0.9, 0.05]
     found = made_up([0.1, 0.7, 0.2], half=half, twice=twice)
-    (ax,) = plotting.families(found)
+    (ax,) = tb.plotting.families(found)
     assert title(ax) == found.attrs["verdict"]
     np.testing.assert_allclose([bar.get_width() for bar in ax.patches], [0.1, 0.7, 0.2])
     np.testing.assert_array_equal(line(ax, "priors half as wide").get_xdata(), half)
@@ -47,14 +42,14 @@ def test_bars_are_probabilities_and_markers_those_of_other_priors():
     assert row_labels(ax) == ["parabola", "circle", "ellipse"]
     assert texts(ax) == ["0.1", "0.7", "0.2"]
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first family is on top
-    (none,) = plotting.families(made_up([np.nan, np.nan]))
+    (none,) = tb.plotting.families(made_up([np.nan, np.nan]))
     assert (texts(none), len(none.patches)) == (["no probabilities"], 0)
 
 
 def test_what_is_wrong_with_a_family_stands_beside_it():
     flags = {"fits": [False, True, False, True], "sampled": [True, True, False, True]}
     found = made_up([0.3, 0.5, 0.0, 0.2], **flags, converged=[False, True, True, False])
-    (ax,) = plotting.families(found)
+    (ax,) = tb.plotting.families(found)
     names, flags = zip(*(label.partition("\n")[::2] for label in row_labels(ax)), strict=True)
     assert names == ("parabola", "circle", "ellipse", "power-law")
     assert [flag.split(", ") for flag in flags][::3] == [["does not fit", "not converged"], ["not converged"]]
@@ -64,7 +59,7 @@ def test_what_is_wrong_with_a_family_stands_beside_it():
 
 
 def test_where_none_fits_that_is_what_the_figure_says_first():
-    fitting, none = (plotting.families(made_up([0.6, 0.4], fits=fits))[0] for fits in (True, False))
+    fitting, none = (tb.plotting.families(made_up([0.6, 0.4], fits=fits))[0] for fits in (True, False))
     assert title(none).replace("\n", " ") == NONE_FITS
     sizes = [ax.title.axes._left_title.get_fontsize() for ax in (none, fitting)]
     assert sizes[0] > sizes[1]
@@ -73,14 +68,14 @@ def test_where_none_fits_that_is_what_the_figure_says_first():
 
 def test_elpd_differences_have_a_panel_of_their_own():
     found = made_up([0.1, 0.7, 0.2], elpd=[-12.0, 0.0, -1.0])
-    panels = plotting.families(found)
+    panels = tb.plotting.families(found)
     assert panels.shape == (2,)
     (bars,) = (bars for bars in panels[1].containers if len(bars.lines[0].get_xdata()))
     np.testing.assert_array_equal(bars.lines[0].get_xdata(), found.elpd_difference)
     ends = np.array([bar[:, 0] for bar in bars.lines[2][0].get_segments()])
     np.testing.assert_allclose(np.diff(ends)[:, 0], 2.0 * found.elpd_difference_error)
     assert panels[1].get_xscale() == "linear"
-    panels = plotting.families(made_up([0.0, 0.7, 0.3], sampled=[False, True, True], elpd=[0.0, -1.0, 0.0]))
+    panels = tb.plotting.families(made_up([0.0, 0.7, 0.3], sampled=[False, True, True], elpd=[0.0, -1.0, 0.0]))
     drawn = [bars.lines[0].get_xdata() for bars in panels[1].containers]
     assert np.isfinite(np.concatenate(drawn)).sum() == 2  # of families that were sampled
     panels[0].figure.canvas.draw()
@@ -88,18 +83,10 @@ def test_elpd_differences_have_a_panel_of_their_own():
 
 @pytest.mark.parametrize("worst", [-140.0, -3e5])
 def test_differences_that_are_large_do_not_hide_small_ones(worst):
-    panels = plotting.families(made_up([0.1, 0.7, 0.2], elpd=[worst, 0.0, -1.0]))
+    panels = tb.plotting.families(made_up([0.1, 0.7, 0.2], elpd=[worst, 0.0, -1.0]))
     assert panels[1].get_xscale() == "symlog"
     assert panels[1].get_xlim()[0] < worst
     assert 3 <= len(panels[1].get_xticks()) <= 5
-
-
-def test_axes_that_do_not_fit_are_refused():
-    axes = own_axes(2)
-    with refused(ParameterError, "axes", "(2,)", "(1,)"):
-        plotting.families(made_up([0.5, 0.5]), axes=axes)
-    with refused(ParameterError, "axes", "(2,)", "elpd"):
-        plotting.families(made_up([0.5, 0.5], elpd=[0.0, -1.0]), axes=axes[0])
 
 
 # --- Assumptions ------------------------------------------------------------------------------------------------------
@@ -108,7 +95,7 @@ def test_axes_that_do_not_fit_are_refused():
 def test_marks_lie_at_their_distances_and_rejected_ones_say_so():
     columns = {"moved_in_gap": [0.1, 2.0, np.nan], "moved_beside": [0.05, 3.0, 0.2], "fits": [1, 0, 1]}
     names = ["friction as stated", "family circle", "drift inferred"]
-    ax = plotting.assumptions(
+    ax = tb.plotting.assumptions(
         xr.Dataset({name: ("assumption", of) for name, of in columns.items()}, {"assumption": names})
     )
     drawn = {line.get_label(): line.get_xdata() for line in ax.lines}
@@ -121,7 +108,7 @@ def test_marks_lie_at_their_distances_and_rejected_ones_say_so():
 
 
 def test_contours_of_the_prior_are_drawn_within_the_rods_reach(posterior):
-    ax = plotting.prior_contours(posterior, contours=3)
+    ax = tb.plotting.prior_contours(posterior, contours=3)
     draws = posterior["prior"].to_dataset().isel(chain=0, draw=[0, 499, 999])
     pale = [line for line in ax.lines if line.get_alpha() == 0.2]
     dark = [line for line in ax.lines if line.get_alpha() == 0.7]
@@ -139,10 +126,10 @@ def test_contours_of_the_prior_are_drawn_within_the_rods_reach(posterior):
 
 @pytest.mark.slow
 def test_the_median_is_drawn_where_the_rod_touched(posterior):
-    drawn = line(plotting.prior_contours(posterior, truth=CONTOUR), "posterior median, where touched")
+    drawn = line(tb.plotting.prior_contours(posterior, truth=CONTOUR), "posterior median, where touched")
     assert np.ptp(drawn.get_xdata()) < 2.0 * ROD.length
     np.testing.assert_allclose(drawn.get_ydata(), CONTOUR.height(drawn.get_xdata()), atol=0.02 * ROD.length)
-    without = plotting.prior_contours(posterior, median=False)
+    without = tb.plotting.prior_contours(posterior, median=False)
     assert not any("median" in label for label in labels(without))
 
 
@@ -154,7 +141,7 @@ def coloured(ax, colour, alpha):
 
 
 @pytest.mark.parametrize(
-    ("draw", "group"), [(plotting.prior_contours, "posterior"), (plotting.posterior_contours, "prior")]
+    ("draw", "group"), [(tb.plotting.prior_contours, "posterior"), (tb.plotting.posterior_contours, "prior")]
 )
 def test_one_is_drawn_without_the_other(posterior, draw, group):
     ax = draw(posterior.filter(lambda node: node.name != group))
@@ -162,11 +149,11 @@ def test_one_is_drawn_without_the_other(posterior, draw, group):
 
 
 def test_contours_of_the_posterior_are_drawn_over_those_of_the_prior(posterior):
-    ax = plotting.posterior_contours(posterior, contours=3, truth=CONTOUR)
+    ax = tb.plotting.posterior_contours(posterior, contours=3, truth=CONTOUR)
     parabolas = ["parabola, from the prior", "parabola, from the posterior"]
     assert labels(ax) == ["rod's reach", *parabolas, "true contour", "pivot"]
     group, prior = posterior["posterior"].to_dataset(), posterior["prior"].to_dataset()
-    colours = {"prior": "#E69F00", "posterior": plotting.PALETTE["median"]}
+    colours = {"prior": "#E69F00", "posterior": tb.plotting.PALETTE["median"]}
     for name, draws in (("prior", prior), ("posterior", group)):
         values = np.stack([draws[of].values.ravel() for of in ("a", "q", "x_c")], axis=1)
         chosen = values[np.linspace(0, len(values) - 1, 3).astype(int)]

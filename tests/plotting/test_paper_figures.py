@@ -9,18 +9,14 @@ import pytest
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 
+import tactile_bayes as tb
 from helpers.pictures import difference, differs
 from helpers.refusals import refused
-from tactile_bayes import paper_figures
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.paper_figures import caption, draw_all, figure
 from tactile_bayes.plotting import PALETTE, style
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rig import Rig
-from tactile_bayes.sweep import equilibria, scan
 
 COARSE = np.radians(4.0)
 COARSER = np.radians(12.0)
@@ -39,7 +35,7 @@ def observables():
 @pytest.fixture(scope="module")
 def sweeps():
     """Profile II, as in Figures 4 and 8."""
-    return {q: scan(paper_profile("II", q=q), drive_step=COARSER) for q in (0.4, 0.6)}
+    return {q: tb.scan(paper_profile("II", q=q), drive_step=COARSER) for q in (0.4, 0.6)}
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +105,7 @@ def test_the_rod_that_explains_a_contact_is_one_of_the_sweep(panel, phase):
     (rod,) = (line for line in ax.lines if same_color(line.get_color(), PALETTE[phase]))
     (dot,) = (line for line in with_marker(ax, "o") if line.get_markersize() == 4.5)
     x, y = float(dot.get_xdata()[0]), float(dot.get_ydata()[0])
-    state = equilibria(paper_profile("II", q=0.5), [np.arctan(x)])
+    state = tb.equilibria(paper_profile("II", q=0.5), [np.arctan(x)])
     assert state.contact_phase.item() == phase
     np.testing.assert_allclose([state.contact_x.item(), state.contact_y.item()], [x, y], atol=1e-12)
     drawn = np.diff([rod.get_xdata(), rod.get_ydata()], axis=1)
@@ -172,7 +168,7 @@ def test_events_are_marked_where_they_happen(observables, sweeps):
 
 def test_tip_contact_is_thin_and_backward_sweeps_are_dashed():
     (ax, *_) = made(4, distances=[0.6]).axes
-    result = scan(paper_profile("II", q=0.6), drive_step=COARSE)
+    result = tb.scan(paper_profile("II", q=0.6), drive_step=COARSE)
     seen = set()
     for line in curves(ax):
         x, y = (np.asarray(values) for values in line.get_data())
@@ -242,7 +238,7 @@ def points_of(ax, marker):
 def test_points_without_noise_lie_on_the_contour_beside_the_gap(points):
     for ax, profile in zip(points.axes, ("I", "II", "III", "IV"), strict=True):
         contour = paper_profile(profile, q=0.5)
-        events = scan(contour, drive_step=COARSER).events
+        events = tb.scan(contour, drive_step=COARSER).events
         assert ax.get_title() == f"profile {profile}"
         for marker, sweep, side in (("o", "forward", 1.0), ("^", "backward", -1.0)):
             x, y = points_of(ax, marker)
@@ -254,10 +250,10 @@ def test_points_without_noise_lie_on_the_contour_beside_the_gap(points):
 
 
 def test_points_with_noise_are_those_of_step_two():
-    cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
     ax = made(11, distances=[0.5], load_cell=cell, rng=3, drive_step=COARSER).axes[1]
-    measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=COARSER).record, rng=3)
-    contacts = reconstruct(measured, rig=Rig(load_cell=cell))
+    measured = cell.measure(tb.scan(paper_profile("II", q=0.5), drive_step=COARSER).record, rng=3)
+    contacts = tb.reconstruct(measured, rig=tb.Rig(load_cell=cell))
     forward = (contacts.direction.values == "forward") & np.isfinite(contacts.contact_x.values)
     x, y = points_of(ax, "o")
     np.testing.assert_array_equal(x, contacts.contact_x.values[forward])
@@ -271,7 +267,7 @@ def test_captions_say_what_was_chosen():
     for part in ("Holding moment", " profile III, ", "forward and backward", " q = 0.3, 0.4, 0.5, 0.6 L."):
         assert part in caption(5)
     assert "without noise" in caption(11)
-    assert "noise (seed 7)" in caption(11, load_cell=LoadCell(force_noise=0.1, moment_noise=0.1), rng=7)
+    assert "noise (seed 7)" in caption(11, load_cell=tb.LoadCell(force_noise=0.1, moment_noise=0.1), rng=7)
 
 
 def test_files_are_named_by_number_and_carry_their_caption(tmp_path):
@@ -314,7 +310,7 @@ def test_nothing_is_written_where_something_is_wrong(tmp_path):
 def test_what_was_there_stays_when_a_figure_fails(tmp_path, monkeypatch):
     path = draw_all(tmp_path, only=[3], formats=["svg"], distances=[0.5], drive_step=COARSER)[3]["svg"]
     before = path.read_bytes()
-    monkeypatch.setattr(paper_figures, "_save", lambda made, path, *rest: path.write_text("half") and 1 / 0)
+    monkeypatch.setattr(tb.paper_figures, "_save", lambda made, path, *rest: path.write_text("half") and 1 / 0)
     with pytest.raises(ZeroDivisionError):
         draw_all(tmp_path, only=[3], formats=["svg"], distances=[0.4], drive_step=COARSER)
     assert [found.name for found in tmp_path.iterdir()] == [path.name]

@@ -401,6 +401,7 @@ REFUSED = {
     "assumptions": (plotting.assumptions, ["trust"], [of("moved_in_gap", "moved_beside")]),
     "ranks": (plotting.calibration_ranks, ["calibration"], [RANKS.drop_vars("rank_p_value"), RANKS.drop_attrs()]),
     "no ranks": (plotting.calibration_ranks, ["calibration"], [RANKS["ranks"], None]),
+    "design": (plotting.design, ["design"], [xr.Dataset()]),
     "coverage": (plotting.coverage, ["calibration"], [RANKS, SHARES, None]),
     "range": (plotting.contour, ["x", "range"], [0.5, [0.5, 0.5], [0.0, np.nan]]),
     "error map": (plotting.error_map, ["error map"], [of("width", "status")]),

@@ -15,7 +15,7 @@ from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.diagnostics.result_check import doubtful_sides
 from tactile_bayes.reconstruction import contact_sides, sides_and_doubts
 from tactile_bayes.rig import NOTHING
-from tactile_bayes.runs.reconstruction import reconstruction_messages
+from tactile_bayes.runs.readings import reconstruction_messages
 
 
 @pytest.mark.parametrize(("family", "count"), [("parabola", 20), pytest.param("ellipse", 250, marks=pytest.mark.slow)])

@@ -6,31 +6,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tactile_bayes.runs.design import design_messages
+from tactile_bayes.runs.plans import design_messages
 
 
 def found(places, widths, gaps):
     """Of candidates in metres."""
     x, y = np.transpose(places)
-    count, metres = len(places), {"units": "m"}
-    return xr.Dataset(
-        {
-            "base_x": ("candidate", x, metres),
-            "base_y": ("candidate", y, metres),
-            "drive_step": ("candidate", np.full(count, np.radians(2.0))),
-            "drive": ("candidate", [f"turned about {place}" for place in places]),
-            "is_pivot": ("candidate", np.ones(count, dtype=bool)),
-            "samples": ("candidate", np.full(count, 242)),
-            "information": ("candidate", np.full(count, 3.0)),
-            "width": ("candidate", np.asarray(widths, dtype=float)),
-            "gap": ("candidate", np.asarray(gaps, dtype=float)),
-            "reached": ("candidate", np.ones(count)),
-            "nested_width": ("candidate", np.full(count, np.nan)),
-            "present_width": 5e-3,
-            "best": int(np.argmin(widths)),
-        },
-        attrs={"probability": 0.95},
-    )
+    columns = {"base_x": x, "base_y": y, "width": widths, "gap": gaps, "drive_step": np.radians(2.0), "reached": 1.0}
+    columns |= {"samples": 242, "information": 3.0, "nested_width": np.nan, "is_pivot": True}
+    columns["drive"] = [f"turned about {place}" for place in places]
+    made = xr.Dataset({name: ("candidate", np.array(np.broadcast_to(of, len(x)))) for name, of in columns.items()})
+    made["base_x"].attrs["units"] = made["base_y"].attrs["units"] = "m"
+    return made.assign(present_width=5e-3, best=int(np.argmin(widths))).assign_attrs(probability=0.95)
 
 
 GRID = [(-0.1, 0.0), (0.0, 0.0), (0.1, 0.0), (-0.1, 0.02), (0.0, 0.02), (0.1, 0.02), (0.0, -0.02)]

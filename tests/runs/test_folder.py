@@ -28,33 +28,22 @@ def test_files_are_listed_in_the_order_in_which_they_are_written(tmp_path):
     assert folder.files["figure"].read_bytes()[16:24] == (300).to_bytes(4) + (450).to_bytes(4)  # of 150 dots an inch
 
 
-def test_what_a_run_does_not_write_is_removed_and_nothing_else(tmp_path):
-    for name in (*NAMES, "notes.txt", "words.txt.bak"):
-        (tmp_path / name).write_text("former", encoding="utf-8")
-    with Folder(tmp_path, NAMES) as folder:
-        folder.write_lines("words", "words.txt", ["new"])
-    assert contents(tmp_path) == {"words.txt": "new\n", "notes.txt": "former", "words.txt.bak": "former"}
-
-
-@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_a_run_that_fails_leaves_the_former_one(tmp_path, error):
-    for name in NAMES:
-        (tmp_path / name).write_text("former", encoding="utf-8")
+def test_a_run_that_fails_leaves_the_former_one_and_another_replaces_it_and_nothing_else(tmp_path):
+    former = dict.fromkeys((*NAMES, "notes.txt", "words.txt.bak"), "former")
+    for name, text in former.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
 
     def lines():
         yield "one"
-        raise error("it broke")
+        raise KeyboardInterrupt
 
-    def run(folder):
-        with folder:
-            folder.write_lines("table", "table.csv", ["new"])
-            folder.write_lines("words", "words.txt", lines())
-
-    folder = Folder(tmp_path, NAMES)
-    with pytest.raises(error, match="it broke"):
-        run(folder)
-    assert "words" not in folder.files
-    assert contents(tmp_path) == dict.fromkeys(NAMES, "former")
+    with pytest.raises(KeyboardInterrupt), Folder(tmp_path, NAMES) as folder:
+        folder.write_lines("words", "words.txt", lines())
+    assert folder.files == {}
+    assert contents(tmp_path) == former
+    with Folder(tmp_path, NAMES) as folder:
+        folder.write_lines("words", "words.txt", ["new"])
+    assert contents(tmp_path) == {"words.txt": "new\n", "notes.txt": "former", "words.txt.bak": "former"}
 
 
 def test_a_folder_in_place_of_a_file_is_kept(tmp_path):

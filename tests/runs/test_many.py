@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import tactile_bayes as tb
 from helpers.refusals import refused
 from helpers.report_pages import FEW, analysed_quickly, coarse_record, undrawn
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.result import read_result
-from tactile_bayes.record import write_record
 from tactile_bayes.record.netcdf import read_netcdf
-from tactile_bayes.rig import Rig
 from tactile_bayes.runs import many
 
-STATED = Rig(unknown="nothing")
+STATED = tb.Rig(unknown="nothing")
 OPTIONS = {"rng": 3, "settings": FEW, "workers": 1}
 
 
@@ -24,8 +22,8 @@ OPTIONS = {"rng": 3, "settings": FEW, "workers": 1}
 def records(tmp_path_factory):
     folder = tmp_path_factory.mktemp("records")
     record = coarse_record()
-    write_record(record, folder / "one.csv")
-    write_record(record.isel(sample=slice(1, None)), folder / "two.nc")
+    tb.write_record(record, folder / "one.csv")
+    tb.write_record(record.isel(sample=slice(1, None)), folder / "two.nc")
     (folder / "broken.csv").write_text("drive_angle,force_x\n1,2\n", encoding="utf-8")
     (folder / "notes.txt").write_text("not a record", encoding="utf-8")
     return folder
@@ -58,7 +56,7 @@ def test_each_record_is_a_row_and_what_fails_has_its_reason(made):
 def test_a_run_is_that_of_the_record_alone(made, records, tmp_path):
     _, out = made
     alone = analysed_quickly(many.read_record(records / "one.csv"), tmp_path, rig=STATED, rng=3)
-    assert read_result(out / "one" / "posterior.nc")["posterior"].equals(alone.posterior["posterior"])
+    assert tb.read_result(out / "one" / "posterior.nc")["posterior"].equals(alone.posterior["posterior"])
 
 
 def test_what_is_done_is_not_made_again_and_records_may_be_added(made, records, monkeypatch):
@@ -74,7 +72,7 @@ def test_what_is_done_is_not_made_again_and_records_may_be_added(made, records, 
     ("rig", "other", "said"),
     [
         (STATED, {"rng": 4}, "seed is"),
-        (Rig(unknown={"lever": 0.0}), {}, "rig is"),
+        (tb.Rig(unknown={"lever": 0.0}), {}, "rig is"),
         (STATED, {"family": "circle"}, "family is"),
         (STATED, {"probability": 0.9}, "probability is 0.95 there and 0.9 here"),
         (STATED, {"settings": replace(FEW, max_steps=FEW.max_steps + 1)}, "settings is"),
@@ -92,7 +90,7 @@ def test_a_later_call_adds_to_the_table_and_renames_nothing(made, records, tmp_p
     """In a copy of the runs, of a new record with the name of one of them."""
     out, later = shutil.copytree(made[1], tmp_path / "runs"), tmp_path / "later" / "one.csv"
     later.parent.mkdir()
-    write_record(coarse_record().isel(sample=slice(2, None)), later)
+    tb.write_record(coarse_record().isel(sample=slice(2, None)), later)
     row = {"error": "", "seconds": 1.0, "verdict": "All is well."}
     seen = []
     monkeypatch.setattr(many, "_analysed", lambda task: seen.append(task.out.name) or row)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.interrupts import acknowledge_interrupt
-from tactile_bayes.cli.progress import resumable_bar, sampling_bar
-from tactile_bayes.cli.rig_options import RigOptions
+from tactile_bayes.cli.progress import acknowledge_interrupt, resumable_bar, sampling_bar
+from tactile_bayes.cli.rigs import RigOptions
 from tactile_bayes.runs.names import CHECKPOINT, INFERENCE, MANY, OF_POSTERIOR, WATCH_PAGE
 
 if TYPE_CHECKING:
@@ -64,14 +64,13 @@ def infer(
     Of several records, or a folder of them, each has a folder in --out, made by a process for each core, and there is
     one table of all; the same command goes on with those that are not done, and records may be added.
     """
-    from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.many import records_in
 
     options: dict[str, Any] = {
         "family": family,
         "probability": probability,
         "rng": seed,
-        "settings": SamplerSettings(max_seconds=max_seconds),
+        "settings": tb.SamplerSettings(max_seconds=max_seconds),
         "figures": not no_figures,
     }
     if (paths := records_in(record)) != record[:1]:
@@ -101,13 +100,11 @@ def _analysed(
 
 def _of_many(paths: Sequence[Path], rig: RigOptions, out: Path, output: Output, options: dict[str, Any]) -> Answer:
     """Infer the contours of several records."""
-    from tactile_bayes.runs.many import infer_contours
-    from tactile_bayes.tasks import Workers
 
     stated = rig.stated
     of_all = replace(stated, load_cell=rig.in_place_of(stated.load_cell))
     with resumable_bar("record", output.is_silent, out, len(paths)) as note:
-        table = infer_contours(paths, of_all, out=out, workers=Workers(progress=note), **options)
+        table = tb.infer_contours(paths, of_all, out=out, workers=tb.tasks.Workers(progress=note), **options)
     files = {"table": out / "runs.csv", "table, as NetCDF": out / "runs.nc"}
     return Answer([_rows_of(table), "", files], lambda: {"records": table.to_dict()["data_vars"], "files": files})
 
@@ -138,7 +135,6 @@ def demo(
     output: Output,
 ) -> Answer:
     """Simulate a steel wire that sweeps along a parabola, and infer the contour with a band from its noisy record."""
-    from tactile_bayes.rig import Rig, read_record
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 
     path, of_rig = measure_demo(out, rng=seed)
@@ -151,9 +147,9 @@ def demo(
             f"--rig rig.toml --out RUN\n",
             flush=True,
         )
-    rig = Rig.read(of_rig)
+    rig = tb.Rig.read(of_rig)
     options: dict[str, Any] = {"family": "parabola", "rig": rig, "rng": seed, "truth": CONTOUR, "record_file": path}
-    run = _analysed(ctx, output, read_record(path, rig), out, **options)
+    run = _analysed(ctx, output, tb.read_record(path, rig), out, **options)
     return answer_of(ctx, run, {"record": path, "rig": of_rig, **run.files}, TRUTH, "the same command starts again")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from rich.table import Table
 
@@ -27,6 +27,12 @@ class Answer:
     numbers: Callable[[], Mapping[str, Any]]
     interrupted: str = ""
     in_a_line: bool = False  # true if the object for programs is one line
+
+    @classmethod
+    def of(cls, words: Sequence[str], files: Mapping[str, Path], *further: str | Table, **numbers: Any) -> Answer:
+        """Return the usual answer: words, what follows them after an empty line, and files; numbers for programs."""
+        parts = [*words, *([""] if further else []), *further, "", files]
+        return cls(parts, lambda: {"words": words, **numbers, "files": files})
 
 
 def print_answer(answer: Answer, as_json: bool) -> None:

@@ -1,9 +1,13 @@
-"""The command `tactile-bayes`, with its treatment of errors, interrupts and warnings."""
+"""The command `tactile-bayes`, with its treatment of errors, interrupts, warnings and streams."""
 
 from __future__ import annotations
 
+import codecs
+import io
 import os
+import sys
 import traceback
+import unicodedata
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -12,28 +16,34 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+import tactile_bayes as tb
 from tactile_bayes.cli.analysis import demo, infer
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.calibration import calibrate
+from tactile_bayes.cli.calibration import calibrate, calibrate_rig
 from tactile_bayes.cli.command import as_command
-from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
-from tactile_bayes.cli.describing import rig
-from tactile_bayes.cli.design import design
-from tactile_bayes.cli.figures import figures
-from tactile_bayes.cli.inspection import inspect
-from tactile_bayes.cli.measurement import measure
+from tactile_bayes.cli.inspection import inspect, reconstruct
 from tactile_bayes.cli.numbers import as_typed
-from tactile_bayes.cli.reconstruction import reconstruct
-from tactile_bayes.cli.report import report
-from tactile_bayes.cli.rig_calibration import calibrate_rig
-from tactile_bayes.cli.scanning import scan
-from tactile_bayes.cli.sensitivity import sensitivity
-from tactile_bayes.cli.streams import accept_every_text
-from tactile_bayes.cli.trust import trust
+from tactile_bayes.cli.pages import figures, report
+from tactile_bayes.cli.plans import design, sensitivity
+from tactile_bayes.cli.rigs import rig
+from tactile_bayes.cli.simulation import measure, scan
+from tactile_bayes.cli.verdicts import compare, trust
 from tactile_bayes.cli.watching import watch
 from tactile_bayes.errors import TactileBayesError, TactileBayesWarning
 from tactile_bayes.matplotlib_defaults import ignore_user_settings
+
+_HANDLER = "tactile_bayes.stand_in"
+
+# Name of ASCII for streams, under which Typer does not take it for a mistake and write UTF-8.
+_ASCII = "tactile_bayes_ascii"
+# Characters, each before its stand-in.
+_PAIRS = """
+− - – - — - • * ° deg ± +/- × x · . ⋅ . ⁄ / √ sqrt ∞ inf ∂ d ∫ int ′ ' ≤ <= ≥ >= ≠ != ≈ ~ ∈ in → -> ⟹ =>
+‘ ' ’ ' “ " ” " \N{MICRO SIGN} u \N{GREEK SMALL LETTER MU} u \N{COMBINING CIRCUMFLEX ACCENT} ^
+"""
+_WORDS = _PAIRS.split()
+_STAND_INS = dict(zip(_WORDS[::2], _WORDS[1::2], strict=True))
 
 
 class _Commands(TyperGroup):
@@ -135,9 +145,7 @@ def main() -> None:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from tactile_bayes import __version__
-
-        typer.echo(__version__)
+        typer.echo(tb.__version__)
         raise typer.Exit
 
 
@@ -150,3 +158,43 @@ def _options(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error or a refusal.")] = False,
 ) -> None:
     pass
+
+
+def accept_every_text() -> None:
+    """Have stdout and stderr write a readable stand-in for each character that their encoding lacks."""
+    codecs.register_error(_HANDLER, _encoded_by_stand_ins)
+    codecs.register(_ascii_codec)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            is_ascii = codecs.lookup(stream.encoding).name == "ascii"
+            stream.reconfigure(encoding=_ASCII if is_ascii else None, errors=_HANDLER)
+
+
+def _ascii_codec(name: str) -> codecs.CodecInfo | None:
+    if name != _ASCII:
+        return None
+    known = codecs.lookup("ascii")
+    return codecs.CodecInfo(*known, known.incrementalencoder, known.incrementaldecoder, _ASCII)
+
+
+def _encoded_by_stand_ins(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(map(_stand_in, error.object[error.start : error.end])), error.end
+
+
+def _stand_in(character: str) -> str:
+    """Return ASCII for a character: a sign like it, the name of a Greek letter, or the letter without its accents."""
+    if character in _STAND_INS:
+        return _STAND_INS[character]
+    code = ord(character)
+    if 0xDC80 <= code <= 0xDCFF:  # a byte in the name of a file that is no text
+        return f"\\x{code - 0xDC00:02x}"
+    name = unicodedata.name(character, "").split()
+    if name[:1] == ["GREEK"]:
+        letter = name[3] if name[2:3] == ["LETTER"] else name[1]
+        return letter.capitalize() if "CAPITAL" in name else letter.lower()
+    power = "^" if unicodedata.decomposition(character).startswith("<super>") else ""
+    parts = unicodedata.normalize("NFKD", character)
+    plain = "".join(part if part.isascii() else _STAND_INS.get(part, "") for part in parts if part != character)
+    return power + plain if plain else "?"

@@ -1,4 +1,4 @@
-"""The command `calibrate`: coverage of intervals over simulated records."""
+"""The commands `calibrate` and `calibrate-rig`: coverage over simulated records, and the rig from a known contour."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import tactile_bayes as tb
+from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.progress import WorkerOptions, resumable_bar
-from tactile_bayes.cli.rig_options import RigFile
-from tactile_bayes.cli.scan_options import Pivots, pivots_in
-from tactile_bayes.runs.names import CALIBRATION
+from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, sampling_bar
+from tactile_bayes.cli.rigs import RigFile, RigOptions
+from tactile_bayes.cli.scan_options import GaugeOptions, Pivots, pivots_in
+from tactile_bayes.runs.names import CALIBRATION, RIG
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,9 +54,7 @@ def calibrate(
     """
     import numpy as np
 
-    from tactile_bayes.rig import Rig
-    from tactile_bayes.runs.calibration import calibrate_into
-    from tactile_bayes.sweep import Rotation
+    from tactile_bayes.runs.verdicts import calibrate_into
 
     common = ctx.find_root().params
     common["debug"] = common["debug"] or debug
@@ -62,28 +62,21 @@ def calibrate(
     experiment: dict[str, Any] = {
         "family": family,
         "rig": rig.stated,
-        "drive": [Rotation(pivot, drive_angles=angles) for pivot in pivots_in(base)],
-        "truth": None if truth is None else Rig.read(truth),
+        "drive": [tb.Rotation(pivot, drive_angles=angles) for pivot in pivots_in(base)],
+        "truth": None if truth is None else tb.Rig.read(truth),
         "rng": seed,
     }
     if replicate is not None:
-        from tactile_bayes.calibration.calibrate import calibration_replicate
-
-        return _of_replicate(calibration_replicate(replicate, out=out, throw=common["debug"], **experiment))
+        return _of_replicate(
+            tb.calibration.calibration_replicate(replicate, out=out, throw=common["debug"], **experiment)
+        )
 
     with resumable_bar("replicate", output.is_silent, out, replicates) as note:
         run = calibrate_into(out, replicates=replicates, workers=work.reporting(note), **experiment)
     found = run.result
     names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
-    return Answer(
-        [found.attrs["verdict"], "", _table(found), "", run.files],
-        lambda: {
-            "words": [found.attrs["verdict"]],
-            **{name: found.attrs[name] for name in names},
-            "claims": columns_of(found, "claim"),
-            "files": run.files,
-        },
-    )
+    numbers = {**{name: found.attrs[name] for name in names}, "claims": columns_of(found, "claim")}
+    return Answer.of([found.attrs["verdict"]], run.files, _table(found), **numbers)
 
 
 def _of_replicate(made: Replicate) -> Answer:
@@ -121,3 +114,44 @@ def _table(found: xr.Dataset) -> Table:
             rows.append((CLAIMS[row["claim"]], held, f"{count:,}"))
     stated = f"stated with {found.attrs['probability']:.0%}"
     return table_of([stated, "holds in", "of replicates"], rows, left=[stated])
+
+
+def calibrate_rig(
+    *,
+    record: Annotated[
+        list[Path], "Records of the gauge, .csv or .nc, each with its own zeros and its pivots.", typer.Argument()
+    ],
+    out: Annotated[Out, Writes(RIG)],
+    gauge: GaugeOptions,
+    rig: RigOptions,
+    probability: Annotated[float, "Probability of the intervals.", typer.Option(min=0.0, max=1.0)] = 0.95,
+    seed: Seed = 1,
+    output: Output,
+) -> Answer:
+    """Calibrate the rig on a gauge: infer stiffness, encoder, lever and the like from sweeps along a known contour.
+
+    Its rig.toml is for --rig of the other commands, and of this one, where records of another gauge or place add to it.
+    """
+    from tactile_bayes.runs.rig import calibrate_rig_into
+
+    contour, read = gauge.contour, [rig.read(path) for path in record]
+    with sampling_bar(output.is_silent) as progress:
+        run = calibrate_rig_into(
+            out,
+            [measured for measured, _ in read],
+            contour=contour,
+            probability=probability,
+            rig=read[0][1],
+            rng=seed,
+            progress=progress,
+        )
+    attrs = run.result.attrs
+    return Answer.of(
+        run.messages,
+        run.files,
+        quantities(run.summary, {}),
+        converged=bool(attrs["converged"]),
+        **{name: attrs[name] for name in ("message", "gauge")},
+        probability=run.summary.attrs["probability"],
+        quantities=columns_of(run.summary, "quantity"),
+    )

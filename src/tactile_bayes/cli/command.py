@@ -20,6 +20,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 from typer.models import ParameterInfo
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, print_answer
 
 Out = Annotated[Path, "Folder for results; created if missing."]
@@ -87,7 +88,6 @@ def as_command(function: Callable[..., Answer]) -> Callable[..., None]:
 
 def _refuse_replaced_inputs(options: Iterable[Parameter], given: Mapping[str, Any]) -> None:
     """Refuse options by which the command would replace a file that it reads."""
-    from tactile_bayes.tasks import refuse_replacing
 
     outputs, inputs = list[Path](), list[Path]()
     for option in options:
@@ -97,7 +97,7 @@ def _refuse_replaced_inputs(options: Iterable[Parameter], given: Mapping[str, An
         paths = [Path(path) for path in (value if isinstance(value, list) else [value]) if isinstance(path, kinds)]
         (outputs if isinstance(mark, Writes) else inputs).extend(file for path in paths for file in mark.files(path))
     if outputs and inputs:
-        refuse_replacing(outputs, inputs)
+        tb.tasks.refuse_replacing(outputs, inputs)
 
 
 def _options(owner: Callable[..., Any]) -> Iterator[Parameter]:

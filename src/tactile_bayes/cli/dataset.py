@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Output, Writes, as_command
 from tactile_bayes.cli.progress import WorkerOptions, counted, resumable_bar, step_bar
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tactile_bayes.datasets.manifest import Manifest
-    from tactile_bayes.tasks import TaskProgress
 
 dataset = typer.Typer(
     help="Synthetic data sets, made from a specification.",
@@ -49,20 +49,19 @@ def generate(
 
     The same specification gives the same numbers, however many workers there are.
     """
-    from tactile_bayes import datasets
     from tactile_bayes.datasets.manifest import read_manifest
 
-    spec = datasets.read_specification(specification)
-    last: TaskProgress | None = None
+    spec = tb.datasets.read_specification(specification)
+    last: tb.tasks.TaskProgress | None = None
 
     with resumable_bar("record", output.is_silent, out, spec.records) as note:
 
-        def progress(made: TaskProgress) -> None:
+        def progress(made: tb.tasks.TaskProgress) -> None:
             nonlocal last
             last = made
             note(made)
 
-        datasets.generate(spec, out, workers=work.reporting(progress))
+        tb.datasets.generate(spec, out, workers=work.reporting(progress))
     manifest = read_manifest(out)
     return Answer(_words(out, manifest, last), lambda: {**_numbers(out, manifest), "made": last.made if last else 0})
 
@@ -79,10 +78,9 @@ def verify(
 
     Files are compared with the checksums in the manifest, which also states the specification of the data set.
     """
-    from tactile_bayes import datasets
 
     with step_bar(output.is_silent, "file", at_first="files to be read") as show:
-        manifest = datasets.verify(folder, regenerate=regenerate, progress=lambda verified: show(*verified))
+        manifest = tb.datasets.verify(folder, regenerate=regenerate, progress=lambda verified: show(*verified))
     count = len(manifest.shards)
     again = min(regenerate, count)
     read = f"{folder}: {counted(manifest.records, 'record')} in {counted(count, 'file')}, every byte as it was written"
@@ -101,10 +99,9 @@ def record(
     output: Output,
 ) -> Answer:
     """Write one record to a file, as `infer` takes it."""
-    from tactile_bayes import datasets, write_record
 
-    found = datasets.record(source, index, truth=truth)
-    write_record(found, out)
+    found = tb.datasets.record(source, index, truth=truth)
+    tb.write_record(found, out)
     samples = found.sizes["sample"]
     return Answer(
         [f"record {index} of {source}, {samples} samples: {out}"],
@@ -124,7 +121,7 @@ def _numbers(folder: Path, manifest: Manifest) -> dict[str, Any]:
     }
 
 
-def _words(out: Path, manifest: Manifest, last: TaskProgress | None) -> Iterator[str]:
+def _words(out: Path, manifest: Manifest, last: tb.tasks.TaskProgress | None) -> Iterator[str]:
     size = sum(shard.bytes for shard in manifest.shards)
     made = "all existed already, with the right sizes; dataset verify compares every byte"
     if last is not None:

@@ -1,20 +1,22 @@
-"""The command `inspect`: the contents of a file, and what looks wrong, before anything is inferred from it."""
+"""The commands `inspect` and `reconstruct`: what is in a file and looks wrong, and contact points sample by sample."""
 
 from __future__ import annotations
 
 import shlex
 import warnings
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
-from tactile_bayes.cli.command import Output, Writes
+from tactile_bayes.cli.command import Out, Output, Writes
 from tactile_bayes.cli.numbers import assigned
 from tactile_bayes.cli.progress import step_bar
-from tactile_bayes.cli.rig_options import Record, RigOptions
+from tactile_bayes.cli.rigs import Record, RigOptions
 from tactile_bayes.errors import RecordWarning
-from tactile_bayes.runs.names import INSPECTION
+from tactile_bayes.runs.names import INSPECTION, RECONSTRUCTION
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -22,8 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.diagnostics.inspection import Inspection
-    from tactile_bayes.rig import Rig
+    from tactile_bayes.runs.readings import ReconstructionRun
 
 _SOURCES = {
     "given": "as rig.toml and options say",
@@ -31,6 +32,13 @@ _SOURCES = {
     "unloaded samples": "not stated, found in the unloaded samples",
     "nothing": "neither stated nor found",
     "too few unloaded samples": "not stated, and too few unloaded samples to estimate it",
+}
+_NOISE_SOURCES = {
+    "data sheet": "The noise is that of the load cell as the file states it.",
+    "unloaded samples": "No noise is stated: bias and noise are taken from the unloaded samples.",
+    "nothing": "There is no noise, neither stated nor in unloaded samples: no standard deviations.",
+    "too few unloaded samples": "No noise is stated, and too few samples are unloaded to estimate it: every "
+    "sample counts as loaded. Give --force-noise and --moment-noise.",
 }
 
 
@@ -51,9 +59,8 @@ class _FileOptions(RigOptions):
     ] = None
 
     @property
-    def stated(self) -> Rig:
+    def stated(self) -> tb.Rig:
         """The rig as file and options state it, apart from its noise."""
-        from tactile_bayes.load_cell import LoadCell
 
         rig = super().stated
         columns = assigned("--column", self.column, "COLUMN=NAME[UNIT], like force_x=Fx[mN]")
@@ -65,7 +72,7 @@ class _FileOptions(RigOptions):
         )
         cell = rig.load_cell
         if self.frame is not None:
-            cell = replace(cell or LoadCell(), frame=self.frame)
+            cell = replace(cell or tb.LoadCell(), frame=self.frame)
         return replace(rig, file=file, load_cell=cell)
 
 
@@ -84,18 +91,16 @@ def inspect(
     the unloaded samples if nobody states them. The last line is the next command.
     """
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.diagnostics.inspection import inspect_record
-
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RecordWarning)  # they are among the contents
             measured, of_record = rig.read(record)
-        found = inspect_record(measured, of_record, progress=show)
+        found = tb.inspect_record(measured, of_record, progress=show)
         beside = _beside(measured)
         texts = (f"{name.replace('_', ' '):<12}{text}" for name, several in beside.items() for text in several)
         contents = [*_contents(found, of_record.format.columns), *texts]
         files: Mapping[str, Path] = {}
         if out is not None:
-            from tactile_bayes.runs.inspection import write_inspection
+            from tactile_bayes.runs.readings import write_inspection
 
             if of_record.load_cell is None:  # the frame is stated without one, too
                 of_record = replace(of_record, load_cell=rig.stated.load_cell)
@@ -104,7 +109,9 @@ def inspect(
     return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files) | beside)
 
 
-def _words(found: Inspection, contents: list[str], again: str, files: Mapping[str, Path]) -> Iterator[Any]:
+def _words(
+    found: tb.diagnostics.Inspection, contents: list[str], again: str, files: Mapping[str, Path]
+) -> Iterator[Any]:
     yield from (*found.messages, "", *contents, "", _sweeps(found.sweeps), "", _channels(found.channels), "")
     if found.statuses:
         yield "Raw Step 2: " + ", ".join(f"{count} {fate}" for fate, count in found.statuses.items())
@@ -146,12 +153,11 @@ def _as_options(rig: _FileOptions) -> str:
     return words
 
 
-def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
+def _contents(found: tb.diagnostics.Inspection, origins: Mapping[str, str]) -> list[str]:
     """Return the contents of the file, except its sweeps and channels; origins are those of the rig's file."""
     from tactile_bayes.diagnostics.findings import quantity
-    from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
-    record, rod = found.record, rod_of(found.record)
+    record, rod = found.record, tb.record.rod_of(found.record)
     sweeps = found.sweeps.sizes["sweep"]
     if record.attrs["units"] == "SI":
         of_rod = [f"L = {quantity(rod.length, 'm')}", f"EI = {rod.flexural_rigidity:.4g} N m²"]
@@ -163,10 +169,14 @@ def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
         assumed = ", which the file does not state" if record.attrs.get("units_source") == "assumed" else ""
         units = f"dimensionless, in units of the rod{assumed}"
         units = ", ".join([units, *rod.shape_in_words("1/L")])
-    axes = "fixed, along x and y" if frame_of(record) == "fixed" else "turning with the drive, along the rod and across"
-    taken = [f"{name} = {origins[name]}" if name in origins else name for name in MEASURED]
-    others = [str(name) for name in record.data_vars if name not in MEASURED]
-    absent = [name for name in MEASURED[-3:] if name not in present_channels(record)]
+    axes = (
+        "fixed, along x and y"
+        if tb.record.frame_of(record) == "fixed"
+        else "turning with the drive, along the rod and across"
+    )
+    taken = [f"{name} = {origins[name]}" if name in origins else name for name in tb.record.MEASURED]
+    others = [str(name) for name in record.data_vars if name not in tb.record.MEASURED]
+    absent = [name for name in tb.record.MEASURED[-3:] if name not in tb.record.present_channels(record)]
     return [
         f"samples     {record.sizes['sample']} in {sweeps} sweep{'s' * (sweeps != 1)}",
         f"columns     {', '.join(name for name in taken if name not in absent)}",
@@ -230,8 +240,7 @@ def _channels(channels: xr.Dataset) -> Table:
     return table_of(heads, rows, left=["channel"])
 
 
-def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[str, Any]:
-    from tactile_bayes.record import frame_of, rod_of
+def _numbers(found: tb.diagnostics.Inspection, again: str, files: Mapping[str, Path]) -> dict[str, Any]:
     from tactile_bayes.record.attributes import rod_attributes
 
     record = found.record
@@ -247,8 +256,8 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
         "columns": [str(name) for name in record.data_vars],
         "units": record.attrs["units"],
         "units_assumed": record.attrs.get("units_source") == "assumed",
-        "rod": {name.removeprefix("rod_"): value for name, value in rod_attributes(rod_of(record)).items()},
-        "load_cell_frame": frame_of(record),
+        "rod": {name.removeprefix("rod_"): value for name, value in rod_attributes(tb.record.rod_of(record)).items()},
+        "load_cell_frame": tb.record.frame_of(record),
         "load_cell": found.load_cell.entries() if found.load_cell is not None else None,
         "load_cell_source": found.load_cell_source,
         "sweeps": sweeps,
@@ -272,3 +281,45 @@ def _suspicious(samples: xr.Dataset) -> dict[str, Any]:
         else:
             numbers[kind] = np.flatnonzero(flags)
     return numbers
+
+
+def reconstruct(
+    *,
+    record: Record,
+    out: Annotated[Out, Writes(RECONSTRUCTION)],
+    method: Annotated[
+        Literal["raw", "constrained"] | None,
+        "raw uses the four numbers of a sample as they are; constrained, the default if there is noise, finds the most "
+        "probable contact that a rod can make.",
+    ] = None,
+    rig: RigOptions,
+    output: Output,
+) -> Answer:
+    """Find contact points with standard deviations (Step 2), from every sample in contact.
+
+    Numbers under [unknown] of rig.toml, like friction = 0.2, are taken into account. Noise that is not stated is
+    estimated from the samples before first contact and after snap-off.
+    """
+    with step_bar(output.is_silent) as show:
+        from tactile_bayes.runs.readings import reconstruct_into, reconstruction_messages
+
+        measured, of_record = rig.read(record)
+        show(1, 2)
+        run = reconstruct_into(measured, out, method=method, rig=of_record)
+    words = reconstruction_messages(run.result)
+    source = [_NOISE_SOURCES[run.source]] if run.source in _NOISE_SOURCES else []
+    return Answer([*words, *source, "", run.files], lambda: _contact_numbers(run, words))
+
+
+def _contact_numbers(run: ReconstructionRun, words: tuple[str, ...]) -> dict[str, Any]:
+    attrs = run.result.attrs
+    misfit = ("misfit_sum", "misfit_samples", "misfit_probability", "axial_score")
+    return {
+        "words": words,
+        **{name: attrs[name] for name in ("method", "friction", "units")},
+        "samples": dict(Counter(run.result.status.values.tolist()).most_common()),
+        **{name: attrs.get(name) for name in misfit},
+        "load_cell": run.load_cell.entries() if run.load_cell is not None else None,
+        "load_cell_source": run.source,
+        "files": run.files,
+    }

@@ -1,24 +1,31 @@
-"""Progress bars of tasks, steps and sampling, with the remaining time; the workers whose tasks they show."""
+"""Progress of long runs: bars with the remaining time, the workers behind them, and what an interrupt keeps."""
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Annotated
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tactile_bayes.cli.interrupts import resumable
+import typer
+
+import tactile_bayes as tb
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from tactile_bayes.inference.ensembles import Progress
-    from tactile_bayes.tasks import TaskProgress, Workers
 
 _GOAL = 1000.0  # effective sample size at which sampling stops, as in `SamplerSettings`
 _MAX_R_HAT = 1.01  # R̂ below which sampling stops, as in `SamplerSettings`
+_USUAL: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 
 
 @dataclass(frozen=True)
@@ -31,12 +38,11 @@ class WorkerOptions:
         "tcp://10.0.0.1:8786.",
     ] = None
 
-    def reporting(self, progress: Callable[[TaskProgress], object]) -> Workers:
+    def reporting(self, progress: Callable[[tb.tasks.TaskProgress], object]) -> tb.tasks.Workers:
         """Return the workers, of which a function hears."""
-        from tactile_bayes.tasks import Workers
 
         where = self.workers
-        return Workers(int(where) if where is not None and where.isdecimal() else where, progress)
+        return tb.tasks.Workers(int(where) if where is not None and where.isdecimal() else where, progress)
 
 
 @contextmanager
@@ -47,12 +53,12 @@ def resumable_bar(
     total: int | None = None,
     *,
     then: str = "the same command resumes",
-) -> Iterator[Callable[[TaskProgress], object]]:
+) -> Iterator[Callable[[tb.tasks.TaskProgress], object]]:
     """Show a bar, and yield a function that takes the progress of tasks.
 
     At an interrupt, report how many are in a folder, or that nothing was written, and what the same command then does.
     """
-    last: TaskProgress | None = None
+    last: tb.tasks.TaskProgress | None = None
 
     def have() -> str:
         if where is None:
@@ -64,7 +70,7 @@ def resumable_bar(
     at_first = "beginning" if total is None else f"{counted(total, noun)} to be made"
     with resumable(have, then) as raise_lost, step_bar(quiet, noun, at_first) as show:
 
-        def note(progress: TaskProgress) -> None:
+        def note(progress: tb.tasks.TaskProgress) -> None:
             nonlocal last
             last = progress
             show(progress.done, progress.wanted)
@@ -133,3 +139,57 @@ def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[S
     """Show a bar of sampling; none if quiet or without a terminal."""
     with moving_bar(quiet, "looking for a start, then sampling") as move:
         yield None if move is None else SamplingBar(move, max_seconds)
+
+
+@contextmanager
+def resumable(have: Callable[[], str], then: str) -> Iterator[Callable[[], object]]:
+    """Run a block that an interrupt ends with a message on what was kept, and what the same command then does.
+
+    Call the yielded function regularly: it raises an interrupt that was lost, as in the callback of a weak reference.
+    """
+    come = list[int]()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        come.append(number)
+        raise KeyboardInterrupt
+
+    def raise_lost() -> None:
+        if come:
+            raise KeyboardInterrupt
+
+    try:
+        with _handled(interrupt):
+            yield raise_lost
+    except KeyboardInterrupt:
+        if come[:1] == [signal.SIGTERM]:  # as batch systems send it before they kill
+            typer.echo(f"tactile-bayes: terminated, {have()}: {then}", err=True)
+            raise typer.Exit(143) from None
+        raise KeyboardInterrupt(f"interrupted, {have()}: {then}") from None
+
+
+@contextmanager
+def acknowledge_interrupt(words: str) -> Iterator[None]:
+    """Print a message on stderr at the first interrupt or SIGTERM, since the end of the run takes a while."""
+
+    def answer(number: int, frame: FrameType | None) -> None:
+        for each in ours:
+            signal.signal(each, _USUAL[each])
+        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"\ntactile-bayes: {words}\n".encode())
+        raise KeyboardInterrupt
+
+    with _handled(answer) as ours:
+        yield
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], None]) -> Iterator[list[signal.Signals]]:
+    """Handle signals in the main thread, except those with another handler; yield those that are handled."""
+    is_main = threading.current_thread() is threading.main_thread()
+    ours = [number for number, usual in _USUAL.items() if is_main and signal.getsignal(number) is usual]
+    for number in ours:
+        signal.signal(number, handler)
+    try:
+        yield ours
+    finally:
+        for number in ours:
+            signal.signal(number, _USUAL[number])

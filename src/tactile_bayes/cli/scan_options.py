@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.command import Reads
 from tactile_bayes.cli.numbers import assigned, numbers_asked
 from tactile_bayes.errors import ParameterError
@@ -16,8 +17,6 @@ from tactile_bayes.errors import ParameterError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tactile_bayes.contours import Contour
-    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.sweep import Carried, Drive
 
 _STEPS = (0.001, 28.0)  # smallest and largest step of rotations [degrees]
@@ -63,7 +62,6 @@ class DriveOptions(CarryOptions):
 
     def drives(self, base: Sequence[str] | None, direction: Directions = "both") -> list[Drive]:
         """Return rotations about pivots, the origin if there is no drive, then the drives that carry the base."""
-        from tactile_bayes.sweep import Rotation
 
         if self.carry and not base:
             if direction != "both":
@@ -75,7 +73,7 @@ class DriveOptions(CarryOptions):
                 "it out, or scan them one by one"
             )
         step = rotation_step(self.drive_step)
-        return [*(Rotation(pivot, direction, step) for pivot in pivots_in(base)), *self.carried()]
+        return [*(tb.Rotation(pivot, direction, step) for pivot in pivots_in(base)), *self.carried()]
 
 
 def rotation_step(step: float | None) -> float | None:
@@ -89,13 +87,12 @@ def rotation_step(step: float | None) -> float | None:
 def _carried(text: str, step: float | None) -> Carried:
     """Return a motion along the poses of a file, whose name has no comma unless it is there, or a translation."""
     from tactile_bayes.record.points import columns_in
-    from tactile_bayes.sweep import Motion, Translation
 
     if "," not in text or Path(text).is_file():
         x, y, angles = columns_in(Path(text), ("x", "y", "drive_angle"), "pose")
-        return Motion(x, y, [math.radians(angle) for angle in angles], step)
+        return tb.Motion(x, y, [math.radians(angle) for angle in angles], step)
     left, height, heading, angle, travel = numbers_asked(text, "--carry", 5)
-    return Translation((left, height), math.radians(heading), math.radians(angle), travel, step)
+    return tb.Translation((left, height), math.radians(heading), math.radians(angle), travel, step)
 
 
 @dataclass(frozen=True)
@@ -122,13 +119,11 @@ class ContourOptions:
         typer.Option(dir_okay=False),
     ] = None
 
-    def contour(self, rod: Rod) -> Contour:
+    def contour(self, rod: tb.Rod) -> tb.contours.Contour:
         """Return the contour that the options choose, in the unit of the rod and scaled to its length."""
         import numpy as np
 
-        from tactile_bayes.contours import from_points, paper_profile
         from tactile_bayes.planning.plan import enlarged
-        from tactile_bayes.record.points import read_points
 
         of_profile = self.profile is not None or self.distance is not None
         if of_profile + (self.family is not None) + (self.points is not None) > 1:
@@ -138,12 +133,13 @@ class ContourOptions:
         if self.parameter and self.family is None:
             raise ParameterError("--parameter is for a --family: give one, like --family parabola")
         if self.points is not None:
-            points = read_points(self.points).in_unit("1" if rod.is_dimensionless else "m", str(self.points))
-            return from_points(*np.concatenate(points).T)
+            points = tb.record.read_points(self.points).in_unit("1" if rod.is_dimensionless else "m", str(self.points))
+            return tb.contours.from_points(*np.concatenate(points).T)
         if self.family is not None:
             return _of_family(self.family, self.parameter)
         return enlarged(
-            paper_profile(self.profile or "II", q=0.5 if self.distance is None else self.distance), rod.length
+            tb.contours.paper_profile(self.profile or "II", q=0.5 if self.distance is None else self.distance),
+            rod.length,
         )
 
 
@@ -159,12 +155,12 @@ class GaugeOptions:
     ] = None
 
     @property
-    def contour(self) -> Contour:
+    def contour(self) -> tb.contours.Contour:
         """The contour of the gauge."""
         return _of_family(self.family, self.parameter)
 
 
-def _of_family(name: str, options: Sequence[str] | None) -> Contour:
+def _of_family(name: str, options: Sequence[str] | None) -> tb.contours.Contour:
     from tactile_bayes.contours.families import family_named
 
     family = family_named(name)

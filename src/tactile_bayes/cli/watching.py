@@ -14,11 +14,11 @@ import typer
 from tactile_bayes.cli.analysis import answer_of, decimals
 from tactile_bayes.cli.answer import Answer, columns_of, print_object
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.interrupts import acknowledge_interrupt
 from tactile_bayes.cli.numbers import numbers_asked
-from tactile_bayes.cli.rig_options import RigFile, report_units
+from tactile_bayes.cli.progress import acknowledge_interrupt
+from tactile_bayes.cli.rigs import RigFile, report_units
 from tactile_bayes.errors import InferenceError, ParameterError, TactileBayesError
-from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
+from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH, WATCH_PAGE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl-C again leaves out a part of that)"
 _STOPPED = "stopped by Ctrl-C or a signal"
-
-_PAGE = "watch.html"
 
 # E-value above which the model is wrong: a right one reaches it in one record of a thousand at most.
 _SURPRISING = 1000.0
@@ -230,14 +228,14 @@ class _Follower:
 
     def write_page(self, headline: str, sentences: Sequence[str], *, is_well: bool, is_last: bool = False) -> None:
         """Write the page of the last answer."""
-        from tactile_bayes.report.watch_page import write_watch_page
+        from tactile_bayes.report.writing import write_watch_page
 
         assert self.last is not None
         write_watch_page(
             self.last.posterior,
             self.last.summary,
             self.last.band,
-            self.watched.folder.path / _PAGE,
+            self.watched.folder.path / WATCH_PAGE,
             headline=headline,
             sentences=sentences,
             is_well=is_well and bool(self.last.posterior.attrs["converged"]),
@@ -279,7 +277,7 @@ def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
     words = [*run.messages, *_families(last), f"{sentence(_band(last))}."]
     follower.write_page(said, words, is_well=run.checked is not None and run.checked.is_well, is_last=True)
     folder = follower.watched.folder.path
-    files = {**run.files, "stream": follower.watched.state, "page": folder / _PAGE}
+    files = {**run.files, "stream": follower.watched.state, "page": folder / WATCH_PAGE}
     answer = answer_of(ctx, run, files, {}, "")
     return replace(
         answer,

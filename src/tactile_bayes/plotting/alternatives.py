@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import AxesArray, axes_for, check_dataset, check_panels, label_rows, new_panels
-from tactile_bayes.plotting.labels import number, show_numbers
-from tactile_bayes.plotting.legends import legend
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.axes import AxesArray, axes_for, check_dataset, check_panels, label_rows, new_panels, plot
+from tactile_bayes.plotting.labels import legend, number, show_numbers
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +27,7 @@ _REGIONS = {"in_gap": ("in the gap", "o", -0.12), "beside": ("beside it", "s", 0
 _TICKS = (0.0, 0.25, 0.5, 0.75, 1.0, 2.0, 5.0, *(10.0**k for k in range(1, 9)))
 
 
+@plot("the argument is not a comparison, or the axes have another shape")
 def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     """Draw a comparison of families: the probability of each, and its elpd difference where there is one.
 
@@ -40,11 +40,6 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
         From `tactile_bayes.compare_families`.
     axes : array_like of Axes, shape (2,), optional
         Axes for probabilities and elpd differences; shape (1,) if the comparison has no leave-one-out densities.
-
-    Raises
-    ------
-    ParameterError
-        If the argument is not a comparison, or the axes have another shape.
 
     Examples
     --------
@@ -157,6 +152,7 @@ def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:
     panels[0].set_title(wrapped, loc="left", **style)
 
 
+@plot("the argument is not such a result, or assumptions were left out of it")
 def assumptions(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw how far each other assumption moves the median of a band, in widths of the band.
 
@@ -166,12 +162,6 @@ def assumptions(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ----------
     found : xr.Dataset
         From `tactile_bayes.trust`.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument is not such a result, or assumptions were left out of it.
 
     Examples
     --------

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from inspect import cleandoc, signature
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -13,12 +14,46 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers, check_optional, refused
 from tactile_bayes.contours.base import check_single
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 AxesArray = NDArray[np.object_]
+Plot = TypeVar("Plot", bound=Callable[..., Any])
+
+# What many plots take, by the name of the parameter, as their docstrings state it.
+_TAKEN = {"truth": "truth : Contour, optional\n    The true contour.", "ax": "ax : Axes, optional"}
+# What their examples begin with, by the name that it makes.
+_MADE = {
+    "scanned": """
+>>> import tactile_bayes as tb
+>>> scanned = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.1)""",
+    "measured": """
+>>> cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+>>> measured = cell.measure(scanned.record, rng=1)""",
+    "inferred": """
+>>> from matplotlib.figure import Figure
+>>> stated, quick = tb.Rig(unknown="nothing"), tb.SamplerSettings(min_ess=100, max_r_hat=1.1)
+>>> inferred = tb.infer_contour(measured, rig=stated, rng=1, settings=quick)""",
+}
+
+
+def plot(refusal: str = "", example: str = "") -> Callable[[Plot], Plot]:
+    """Complete the docstring of a plot by what many of them take, when it raises ParameterError, and its example."""
+
+    def completed(function: Plot) -> Plot:
+        said, _, examples = cleandoc(function.__doc__ or "").partition("\nExamples\n")
+        taken = [
+            _TAKEN[name] for name in signature(function).parameters if name in _TAKEN and f"\n{name} :" not in said
+        ]
+        said = "\n".join([said.rstrip(), *taken, ""])
+        raises = f"\nRaises\n------\nParameterError\n    If {refusal}.\n" if refusal else ""
+        made = "".join([*_MADE.values()][: 1 + list(_MADE).index(example)]) if example else ""
+        function.__doc__ = f"{said}{raises}\nExamples\n" + examples.replace("\n", f"{made}\n", 1)
+        return function
+
+    return completed
 
 
 def axes_for(ax: Axes | None, truth: Any = None, *, height: float | None = None) -> Axes:

@@ -17,10 +17,11 @@ from tactile_bayes.plotting.axes import (
     check_panels,
     label_rows,
     new_panels,
+    plot,
     write_instead,
 )
 from tactile_bayes.plotting.labels import number, percent
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,6 +47,7 @@ class _Ranks(NamedTuple):
     word: str = ""
 
 
+@plot("the argument is not a calibration, none of its replicates has a posterior, or the axes have another shape")
 def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray:
     """Draw the ranks of the truth among draws of the posterior, which are uniform for correct posteriors.
 
@@ -64,11 +66,6 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
         From `tactile_bayes.calibrate`.
     axes : array_like of Axes, shape (quantities,), optional
         One for each quantity, in their order.
-
-    Raises
-    ------
-    ParameterError
-        If the argument is not a calibration, none of its replicates has a posterior, or the axes have another shape.
 
     Examples
     --------
@@ -101,6 +98,7 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
     return panels
 
 
+@plot("the argument is not a calibration")
 def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw the coverage of each claim: the share of replicates in which it holds, and its standard error.
 
@@ -112,12 +110,6 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ----------
     calibration : xr.Dataset
         From `tactile_bayes.calibrate`.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument is not a calibration.
 
     Examples
     --------

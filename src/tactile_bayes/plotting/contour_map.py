@@ -13,11 +13,17 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_array, check_mapping, check_numbers, check_optional, check_switch
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import axes_for, check_dataset, write_instead
-from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
-from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
-from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, outline
-from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES, TRUTH
+from tactile_bayes.plotting.axes import axes_for, check_dataset, plot, write_instead
+from tactile_bayes.plotting.labels import (
+    legend_above,
+    legend_entries,
+    legend_entry,
+    number,
+    percent,
+    shown_unit,
+)
+from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, label_enlarged, outline
+from tactile_bayes.plotting.style import BASES, CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,6 +42,7 @@ _EDGES = {"x", "lower", "median", "upper"}
 _GAP = {"left", "right", "bound"}
 
 
+@plot("`x` does not span a range")
 def contour(
     x: ArrayLike,
     *,
@@ -52,8 +59,6 @@ def contour(
     ----------
     x : array_like, shape (n,)
         Numbers that span the range drawn, in the record's unit of length.
-    truth : Contour, optional
-        The true contour.
     contacts : xr.Dataset, optional
         Over "sample": contact_x and contact_y; contact_phase colours the points, and of those with a status only "ok"
         is drawn.
@@ -64,12 +69,6 @@ def contour(
         result of `tactile_bayes.gap`, of which the medians are drawn.
     base : (float, float), optional
         The pivot, in the record's unit of length.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If `x` does not span a range.
 
     Examples
     --------
@@ -116,6 +115,7 @@ def contour(
     return ax
 
 
+@plot()
 def band_detail(
     band: xr.Dataset,
     *,
@@ -130,13 +130,10 @@ def band_detail(
     ----------
     band : xr.Dataset
         Over coordinate "x": lower, upper and median.
-    truth : Contour, optional
-        The true contour.
     gap : (float, float) or xr.Dataset, optional
         As in `contour`.
     shape : xr.Dataset, optional
         A further band, of the shape alone (`contour_band(..., align="translation")`), drawn from its own median.
-    ax : Axes, optional
 
     Examples
     --------
@@ -162,12 +159,11 @@ def band_detail(
         ax.plot(x, np.asarray(truth.height(x)) - median, **TRUTH)
     margin = 0.03 * float(np.ptp(x))
     ax.set_xlim(float(x.min()) - margin, float(x.max()) + margin)
-    attrs = band["lower"].attrs or band["x"].attrs
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, x)
-    set_unit(ax.yaxis, LABELS["contact_y"] + " − median ", "contact_y", attrs, np.concatenate([lower, upper]))
+    label_enlarged(ax, band["lower"].attrs or band["x"].attrs, x, np.concatenate([lower, upper]), "median")
     return ax
 
 
+@plot("there is no band, or something is none")
 def overlaid(
     bands: Mapping[str, xr.Dataset],
     *,
@@ -189,12 +185,6 @@ def overlaid(
     enlarged : bool
         If True, y is measured from `overlay`, or without it from the median of the first run, so that narrow bands are
         visible; contacts are then left out.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If there is no band, or something is none.
 
     Examples
     --------
@@ -236,12 +226,12 @@ def overlaid(
     if reference is None:
         finish_map(ax, attrs)
         return ax
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, np.array(limits[:2]))
-    set_unit(ax.yaxis, f"{LABELS['contact_y']} − {reference.name} ", "contact_y", attrs, np.array(limits[2:]))
+    label_enlarged(ax, attrs, np.array(limits[:2]), np.array(limits[2:]), reference.name)
     legend_above(ax, min(4, len(legend_entries(ax))), legend_entries(ax))
     return ax
 
 
+@plot()
 def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = None) -> Axes:
     """Draw certificate and band of the contour inside the gap, measured from the chord between the end contacts.
 
@@ -253,9 +243,6 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     ----------
     found : xr.Dataset
         From `tactile_bayes.gap`.
-    truth : Contour, optional
-        The true contour.
-    ax : Axes, optional
 
     Examples
     --------
@@ -329,8 +316,7 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
     ax.set_xlim(outside[0], outside[-1])
     ax.set_ylim(low - _ROOM * (high - low), high + _ROOM * (high - low) + 0.1 * abs(low))
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, outside)
-    set_unit(ax.yaxis, LABELS["contact_y"] + " − chord ", "contact_y", attrs, drawn)
+    label_enlarged(ax, attrs, outside, drawn, "chord")
     legend_above(ax, 2, legend_entries(ax))
     return ax
 

@@ -9,11 +9,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.axes import axes_for, check_dataset, label_rows, tile_edges
-from tactile_bayes.plotting.labels import number, show_numbers, shown_unit
-from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
+from tactile_bayes.plotting.axes import axes_for, check_dataset, label_rows, plot, tile_edges
+from tactile_bayes.plotting.labels import legend, legend_above, legend_entry, number, show_numbers, shown_unit
 from tactile_bayes.plotting.maps import draw_pivot, label_map
-from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
+from tactile_bayes.plotting.style import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +33,7 @@ _CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 7.0}
 _LAPLACE, _SAMPLED = "Laplace's approximation", "sampled posteriors"
 
 
+@plot("the argument is not a design")
 def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw the criterion of a design for its candidates, the best of them, and the pivots so far.
 
@@ -46,12 +46,6 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ----------
     found : xr.Dataset
         From `tactile_bayes.design`.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument is not a design.
 
     Examples
     --------

@@ -11,9 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.plotting.labels import DRIVE_ANGLE, set_unit
-from tactile_bayes.plotting.legends import legend_above, legend_entries
-from tactile_bayes.plotting.marks import PALETTE, SWEEP_MARKERS
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, legend_above, legend_entries, set_unit
+from tactile_bayes.plotting.style import PALETTE, SWEEP_MARKERS
 from tactile_bayes.record import CHANNELS, Frame, carried_sweeps, travels_of, turned
 from tactile_bayes.sweep import Event, SweepEvents
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.labels import LABELS, set_unit
-from tactile_bayes.plotting.legends import legend, legend_above, legend_entries
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.labels import LABELS, legend, legend_above, legend_entries, set_unit
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,6 +43,12 @@ def label_map(ax: Axes, attrs: Mapping[Any, Any], limits: Floats, form: str = "{
     """Label both axes of a map with their unit, in a form that holds the symbol."""
     for axis, name in ((ax.xaxis, "contact_x"), (ax.yaxis, "contact_y")):
         set_unit(axis, f"{form.format(LABELS[name])} ", name, attrs, limits)
+
+
+def label_enlarged(ax: Axes, attrs: Mapping[Any, Any], x: Floats, y: Floats, against: str) -> None:
+    """Label the axes of heights that are measured from a line, each with its own unit."""
+    set_unit(ax.xaxis, f"{LABELS['contact_x']} ", "contact_x", attrs, x)
+    set_unit(ax.yaxis, f"{LABELS['contact_y']} − {against} ", "contact_y", attrs, y)
 
 
 def fit_height(ax: Axes) -> None:

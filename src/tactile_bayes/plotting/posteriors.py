@@ -12,9 +12,9 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_kind, check_mapping, check_names, check_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, plot
 from tactile_bayes.plotting.labels import number
-from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.style import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +27,7 @@ _ROWS = "rows are parameters"
 _TRUTH: dict[str, Any] = {"color": PALETTE["change"], "linestyle": "--", "linewidth": 0.9}
 
 
+@plot("a name is unknown, or the axes have another shape")
 def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = None, axes: Any = None) -> AxesArray:
     """Draw the trace of each chain, and its density: chains that agree look alike.
 
@@ -41,11 +42,6 @@ def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = 
         Names of the variables; by default all.
     axes : array_like of Axes, shape (parameters, 2), optional
         One row for each parameter; a variable with further dimensions is one parameter for each of its elements.
-
-    Raises
-    ------
-    ParameterError
-        If a name is unknown, or the axes have another shape.
 
     Examples
     --------
@@ -82,6 +78,7 @@ def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = 
     return grid
 
 
+@plot("a name is unknown, in `names` or in `truth`, or the axes have another shape")
 def pairs(
     posterior: xr.DataTree | xr.Dataset,
     *,
@@ -104,11 +101,6 @@ def pairs(
         `names`, and none that the posterior lacks.
     axes : array_like of Axes, shape (parameters, parameters), optional
         One for each pair of parameters, as in `trace`. Above the diagonal None will do.
-
-    Raises
-    ------
-    ParameterError
-        If a name is unknown, in `names` or in `truth`, or the axes have another shape.
 
     Examples
     --------

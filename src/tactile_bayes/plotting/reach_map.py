@@ -11,10 +11,10 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_switch, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.plotting.axes import axes_for
-from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.axes import axes_for, plot
+from tactile_bayes.plotting.labels import legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
-from tactile_bayes.plotting.marks import PALETTE, TRUTH
+from tactile_bayes.plotting.style import PALETTE, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +30,7 @@ _COUNT = "give a whole number from 1 up, like 40"
 _DASHED: dict[str, Any] = {"linestyle": (0, (6.0, 3.0)), "linewidth": 1.0}
 
 
+@plot("the tree has no prior draws, or `contours` is not positive", example="inferred")
 def prior_contours(
     posterior: xr.DataTree,
     *,
@@ -51,23 +52,10 @@ def prior_contours(
         Number of contours, evenly picked from the draws.
     median : bool
         If True, the posterior's median is drawn over them, along the touched stretch.
-    truth : Contour, optional
-        The true contour.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the tree has no prior draws, or `contours` is not positive.
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
-    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> prior_contours(infer_contour(measured, rig=Rig(unknown="nothing"), rng=1, settings=quick)).get_ylabel()
+    >>> prior_contours(inferred, ax=Figure().subplots()).get_ylabel()
     '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of
@@ -84,13 +72,14 @@ def prior_contours(
     return _draw(ax, posterior, contours, [layer], truth, touched=touched, entry_width=_THIN)
 
 
+@plot("the tree is not a posterior of a contour, or `contours` is not positive", example="inferred")
 def posterior_contours(
     posterior: xr.DataTree, *, contours: int = 40, truth: Contour | None = None, ax: Axes | None = None
 ) -> Axes:
     """Draw contours from the posterior over contours from the prior, to see what the record has added.
 
     Contours are paler beyond the rod's reach. If both look alike, the record is uninformative. A good posterior is a
-    single line on a map: `band_detail` enlarges it. The example of `prior_contours` makes a tree to draw.
+    single line on a map: `band_detail` enlarges it.
 
     Parameters
     ----------
@@ -98,23 +87,10 @@ def posterior_contours(
         From `infer_contour`; without a group `prior` the posterior alone is drawn.
     contours : int
         Number of contours of each, evenly picked from the draws.
-    truth : Contour, optional
-        The true contour.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the tree is not a posterior of a contour, or `contours` is not positive.
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
-    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> posterior_contours(infer_contour(measured, rig=Rig(unknown="nothing"), rng=1, settings=quick)).get_ylabel()
+    >>> posterior_contours(inferred, ax=Figure().subplots()).get_ylabel()
     '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of

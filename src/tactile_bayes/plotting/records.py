@@ -1,4 +1,4 @@
-"""Figures of a record: observables along the drive, and their posterior predictive interval."""
+"""Figures of a record: observables along the drive, their posterior predictive interval, and its inspection."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import xarray as xr
 
 from tactile_bayes.checks import check_kind, check_mapping
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, plot, write_not_measured
 from tactile_bayes.plotting.drive_axis import (
+    DriveAxis,
     draw_events,
     drive_axis,
     finish_channels,
@@ -19,16 +20,15 @@ from tactile_bayes.plotting.drive_axis import (
     reading_style,
     with_events,
 )
-from tactile_bayes.plotting.labels import LABELS, set_unit
-from tactile_bayes.plotting.legends import legend_entry
-from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
-from tactile_bayes.record import CHANNELS, frame_of, validate
+from tactile_bayes.plotting.labels import LABELS, legend_entry, set_unit
+from tactile_bayes.plotting.style import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
+from tactile_bayes.record import CHANNELS, frame_of, present_channels, validate
 from tactile_bayes.sweep import SweepEvents
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.plotting.drive_axis import DriveAxis
+    from tactile_bayes.diagnostics.inspection import Inspection
 
 # Colours of residuals of two overlapping sweeps, after Okabe and Ito.
 _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
@@ -41,8 +41,19 @@ _TURNING_LABELS = {
     "force_x": r"axial force $f_{\mathrm{A}\parallel}$",
     "force_y": r"transversal force $f_{\mathrm{A}\perp}$",
 }
+_COLOURS = {"forward": "#0072B2", "backward": "#D55E00"}
+_WRONG: dict[str, tuple[str, dict[str, Any]]] = {
+    "outlier": ("stands out", {"marker": "o", "markersize": 9.0, "color": "#CC79A7"}),
+    "stuck": ("stuck", {"marker": "s", "markersize": 8.0, "color": "#E69F00"}),
+    "cut_off": ("cut off", {"marker": "D", "markersize": 8.0, "color": "#009E73"}),
+    "repeated": ("twice", {"marker": "h", "markersize": 9.0, "color": "#000000"}),
+    "uneven_step": ("uneven step", {"marker": "|", "markersize": 14.0, "color": "#000000"}),
+}
+_MARKS: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 1.2, "zorder": 4}
+_LEGEND = ["forward", "backward", "first contact", "snap-off", *(words for words, _ in _WRONG.values())]
 
 
+@plot(example="scanned")
 def observables(
     record: xr.Dataset, *, events: Mapping[str, SweepEvents] | None = None, axes: Sequence[Axes] | None = None
 ) -> AxesArray:
@@ -73,10 +84,7 @@ def observables(
 
     Examples
     --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> result = scan(paper_profile("II", q=0.5))
-    >>> observables(result.record, events=result.events)[-1].get_xlabel()
+    >>> observables(scanned.record, events=scanned.events)[-1].get_xlabel()
     'drive angle $\\\\varphi_0$ [°]'
     """
     record = validate(record)
@@ -90,6 +98,7 @@ def observables(
     return panels
 
 
+@plot(example="measured")
 def predictive(
     record: xr.Dataset,
     predicted: xr.Dataset,
@@ -129,12 +138,8 @@ def predictive(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> ideal = scan(paper_profile("II", q=0.5)).record
-    >>> measured = LoadCell(moment_noise=0.02, force_noise=0.05).measure(ideal, rng=1)
-    >>> ends = {"lower": -0.04, "upper": 0.04}
-    >>> predicted = xr.Dataset({f"holding_moment_{end}": ideal["holding_moment"] + off for end, off in ends.items()})
+    >>> ends, true = {"lower": -0.04, "upper": 0.04}, scanned.record["holding_moment"]
+    >>> predicted = xr.Dataset({f"holding_moment_{end}": true + off for end, off in ends.items()})
     >>> predictive(measured, predicted).shape
     (3,)
     """
@@ -283,3 +288,99 @@ def _draw_line(
         if name in PHASES:
             label = PHASES[name] if column == channel else f"true {PHASES[name]}"
             legend_entry(ax, label, color=PALETTE[name], linewidth=linewidth)
+
+
+@plot("there are not three rows of two axes", example="measured")
+def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
+    """Draw the observables of a record along the drive, marks of wrong samples, and unloaded samples enlarged.
+
+    Parameters
+    ----------
+    inspected : Inspection
+        From `tactile_bayes.inspect_record`.
+    axes : array of Axes, shape (3, 2), optional
+        A row for each of holding_moment, force_x and force_y. The left Axes hold readings over the coordinate of
+        `observables`: vertical lines between the samples beside first contact (dotted) and snap-off (dashed) have the
+        colour of the sweep's direction; rings and other marks show samples that look wrong. The right Axes hold
+        readings of the unloaded samples in the order of measurement, with their mean and two standard deviations to
+        either side.
+
+    Examples
+    --------
+    >>> inspection(tb.inspect_record(measured))[0, 1].get_title()
+    'unloaded'
+    """
+    from tactile_bayes.diagnostics.inspection import Inspection
+
+    check_kind("inspected", inspected, Inspection, "give what inspect_record returned")
+    if axes is None:
+        panels = new_panels(3, 2, 5.6, sharex="col", width_ratios=(2.2, 1.0))
+    else:
+        panels = check_panels(axes, (3, 2), f"a row for each of {', '.join(CHANNELS)}")
+    record = inspected.record
+    along = drive_axis(record)
+    for index, channel in enumerate(CHANNELS):
+        readings, zero = panels[index]
+        label = LABELS[channel]
+        if channel not in present_channels(record):
+            write_not_measured(readings, label)
+            zero.set_yticks([])
+            continue
+        _draw_inspected(readings, inspected, index, along)
+        set_unit(readings.yaxis, f"{label}\n", channel, record[channel].attrs, record[channel].values)
+        _draw_unloaded(zero, inspected, index)
+        set_unit(zero.yaxis, "", channel, record[channel].attrs, record[channel].values[inspected.samples.unloaded])
+    along.label(panels[-1, 0].xaxis, with_ticks=False)
+    panels[-1, 1].set_xlabel("sample")
+    panels[0, 1].set_title("unloaded", fontsize="small")
+    panels[0, 0].figure.align_ylabels(list(panels[:, 0]))
+    finish_channels(panels.ravel(), _LEGEND.index, 3, handlelength=1.5, columnspacing=1.2)
+    return panels
+
+
+def _draw_inspected(ax: Axes, inspected: Inspection, index: int, along: DriveAxis) -> None:
+    record, sweeps = inspected.record, inspected.sweeps
+    places, reading = along.values, record[CHANNELS[index]].values
+    along.draw_below(ax)
+    for place, number in enumerate(sweeps.sweep.values):
+        direction = str(sweeps.direction.values[place])
+        rows = record.sweep.values == number
+        style = reading_style(direction, _COLOURS[direction])
+        ax.plot(places[rows], reading[rows], **style)
+        legend_entry(ax, direction, **style)
+        for event, label, line in (("onset", "first contact", ":"), ("snap_off", "snap-off", "--")):
+            between = along.place_of(sweeps.isel(sweep=place), event, np.flatnonzero(rows))
+            if np.isfinite(between):
+                ax.axvline(between, color=_COLOURS[direction], linestyle=line, linewidth=1.0, zorder=0.5)
+                legend_entry(ax, label, color="0.35", linestyle=line, linewidth=1.0)
+    for name, flags in _wrong(inspected, index):
+        label, special = _WRONG[name]
+        ax.plot(places[flags], reading[flags], label=label, **_MARKS, **special)
+
+
+def _draw_unloaded(ax: Axes, inspected: Inspection, index: int) -> None:
+    reading = inspected.record[CHANNELS[index]].values
+    unloaded = inspected.samples.unloaded.values
+    sample = np.arange(reading.size)
+    numbers = inspected.record.sweep.values
+    for start in np.flatnonzero(np.diff(numbers) != 0) + 0.5:
+        ax.axvline(start, color="0.6", linewidth=0.8, zorder=0)
+    row = inspected.channels.isel(channel=index)
+    bias, noise = float(row.bias), float(row.noise)
+    if np.isfinite(bias):
+        ax.axhspan(bias - 2.0 * noise, bias + 2.0 * noise, color=PALETTE["band"], alpha=0.5, linewidth=0.0, zorder=0.2)
+        ax.axhline(bias, color=PALETTE["median"], linewidth=0.8, zorder=0.3)
+    ax.plot(sample[unloaded], reading[unloaded], color=PALETTE["none"], marker=".", markersize=3.0, linestyle="none")
+    for name, flags in _wrong(inspected, index):
+        shown = flags & unloaded
+        if shown.any():
+            ax.plot(sample[shown], reading[shown], **_MARKS, **_WRONG[name][1])
+    ax.set_xlim(-0.02 * reading.size, 1.02 * reading.size)
+
+
+def _wrong(inspected: Inspection, index: int) -> list[tuple[str, Any]]:
+    """Return the kinds of wrong samples that are present, with their flags."""
+    samples = inspected.samples
+    flags = {name: samples[name].values for name in _WRONG}
+    flags = {name: values[:, index] if values.ndim == 2 else values for name, values in flags.items()}
+    return [(name, values) for name, values in flags.items() if values.any()]

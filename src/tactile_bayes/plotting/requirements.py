@@ -10,10 +10,19 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice
-from tactile_bayes.plotting.axes import axes_for, check_among, check_dataset, group_of, tile_edges, write_instead
-from tactile_bayes.plotting.labels import number, percent, set_log_scale, set_unit, show_numbers, shown_unit
-from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
-from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
+from tactile_bayes.plotting.axes import axes_for, check_among, check_dataset, group_of, plot, tile_edges, write_instead
+from tactile_bayes.plotting.labels import (
+    legend,
+    legend_above,
+    legend_entry,
+    number,
+    percent,
+    set_log_scale,
+    set_unit,
+    show_numbers,
+    shown_unit,
+)
+from tactile_bayes.plotting.style import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,6 +38,7 @@ _MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in 
 _MOST_IN_LINE = 6  # largest number of legend entries in a row
 
 
+@plot("the argument does not hold that group")
 def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> Axes:
     """Draw the expected mean width of the band over the noise of the load cell, both logarithmic.
 
@@ -39,12 +49,6 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
     ----------
     found : xr.Dataset or xr.DataTree
         Result of `tactile_bayes.sensitivity`, or its group "required_noise".
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument does not hold that group.
 
     Examples
     --------
@@ -90,6 +94,7 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
     return ax
 
 
+@plot("the argument is not a result of `required_rod`")
 def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw the expected mean width of the band over the length and the diameter of the rod, with a colour bar.
 
@@ -100,12 +105,6 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ----------
     found : xr.Dataset
         From `tactile_bayes.planning.required_rod`.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument is not a result of `required_rod`.
 
     Examples
     --------
@@ -176,6 +175,7 @@ def _plain(attrs: Mapping[Any, Any], si: str) -> dict[str, str]:
     return {"units": si if attrs.get("units") == si else "1"}
 
 
+@plot("the argument is not an error map, or does not hold the choice")
 def error_map(
     found: xr.Dataset,
     *,
@@ -198,12 +198,6 @@ def error_map(
         Errors of contacts across the contour or along it, or widths of bands where it is touched or in the gap.
     reconstruction : {"raw", "constrained"}
         Method of Step 2 that made the contacts.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument is not an error map, or does not hold the choice.
 
     Examples
     --------

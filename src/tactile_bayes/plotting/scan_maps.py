@@ -13,11 +13,10 @@ from tactile_bayes.checks import check_choice, check_kind, check_whole_number, s
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.plotting import maps
-from tactile_bayes.plotting.axes import axes_for
+from tactile_bayes.plotting.axes import axes_for, plot
 from tactile_bayes.plotting.drive_axis import ENDINGS
-from tactile_bayes.plotting.labels import number, shown_unit
-from tactile_bayes.plotting.legends import legend_entry
-from tactile_bayes.plotting.marks import BASES, CONTACT_MARKERS, PALETTE, PHASES
+from tactile_bayes.plotting.labels import legend_entry, number, shown_unit
+from tactile_bayes.plotting.style import BASES, CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.sweep import Scan
 
@@ -38,6 +37,7 @@ _ARC_WIDTH = 3.0
 _OFFSET = np.sqrt(2.0) * _ARC_WIDTH
 
 
+@plot("the scan has no such sweep, or several of this direction, or the count is not positive", example="scanned")
 def rods(
     scan: Scan,
     *,
@@ -61,18 +61,10 @@ def rods(
     count : int
         Largest number of rods, evenly over the samples in contact; those at first contact, phase changes and snap-off
         are added.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the scan has no such sweep, or several of this direction, or the count is not positive.
 
     Examples
     --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> rods(scan(paper_profile("I", q=0.4)), direction="backward").get_xlabel()
+    >>> rods(scanned, direction="backward").get_xlabel()
     '$x$ [$L$]'
     """
     check_kind("scan", scan, Scan, "give what scan returned")
@@ -124,6 +116,7 @@ def rods(
     return ax
 
 
+@plot("`scan` is not a scan", example="scanned")
 def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     """Draw the arcs of the contour that the sweeps touched, in a colour for each base, and the gaps between them.
 
@@ -136,20 +129,12 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     ----------
     scan : Scan
         A scan, from one base or several.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If `scan` is not a scan.
 
     Examples
     --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> [text.get_text() for text in touched(scan(paper_profile("II", q=0.5))).texts]
+    >>> [text.get_text() for text in touched(scanned).texts]
     ['gap\\n0.122 $L$']
-    >>> [text.get_text() for text in touched(scan(paper_profile("II", q=0.5), base=[(0, 0), (0.25, 0)])).texts]
+    >>> [text.get_text() for text in touched(tb.scan(scanned.contour, base=[(0, 0), (0.25, 0)])).texts]
     ['no gap']
     """
     from matplotlib.transforms import ScaledTranslation

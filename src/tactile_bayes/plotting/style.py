@@ -1,4 +1,4 @@
-"""The two looks of figures: for print, and for the screen."""
+"""The looks of figures, for print and for the screen; and colours, lines and markers of one meaning in all of them."""
 
 from __future__ import annotations
 
@@ -21,6 +21,21 @@ _COMMON: dict[str, Any] = {"font.family": ["sans-serif"], "font.sans-serif": ["D
 _COMMON |= {"mathtext.fontset": "dejavusans", "pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none"}
 _COMMON |= {"svg.hashsalt": "tactile-bayes", "savefig.bbox": None, "savefig.facecolor": "white"}
 _TICKS = {"major.width": 0.6, "minor.width": 0.4, "major.size": 3.0, "minor.size": 1.8}  # ticks of both axes, in print
+# Colours after Okabe and Ito, distinguishable with any colour vision.
+PALETTE = {"tip": "#0072B2", "tangential": "#D55E00", "change": "#000000", "none": "#8C8C8C", "sample": "#9A9A9A"}
+PALETTE |= {"object": "#EFEFEF", "band": "#9CCBE8", "median": "#0072B2", "gap": "#F0E442"}
+# Colours of bases in their order, after Okabe and Ito, without the gap's; the seventh base has the first again.
+BASES = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
+# The mark on the best of several choices.
+BEST: Mapping[str, Any] = {"marker": "*", "color": "#D55E00", "markeredgecolor": "white", "linestyle": "none"}
+SWEEP_LINES: Mapping[str, str] = {"forward": "-", "backward": "--"}
+SWEEP_MARKERS: Mapping[str, str] = {"forward": "o", "backward": "^"}
+
+PHASES = {"tip": "tip contact", "tangential": "tangential contact"}
+CONTACT_MARKERS = {"tip": "o", "tangential": "s", "none": "o"}
+
+# The line of the true contour.
+TRUTH: Mapping[str, Any] = {"color": PALETTE["change"], "linewidth": 1.0, "linestyle": "--"}
 
 
 def _letters(size: float, at_ticks: float) -> dict[str, float]:

@@ -9,10 +9,9 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import refused
-from tactile_bayes.plotting.axes import axes_for, check_among, group_of
-from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, number, set_log_scale
-from tactile_bayes.plotting.legends import legend_above, legend_entry
-from tactile_bayes.plotting.marks import BASES, SWEEP_LINES
+from tactile_bayes.plotting.axes import axes_for, check_among, group_of, plot
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, legend_above, legend_entry, number, set_log_scale
+from tactile_bayes.plotting.style import BASES, SWEEP_LINES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +26,7 @@ _CLOSEST = 0.004
 _STRIP = 0.035  # height of the strips below the curves, over that of the Axes
 
 
+@plot("the argument does not hold that group, or there is no such sweep")
 def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes | None = None) -> Axes:
     """Draw the standard deviation of contact points along and across the contour, over the drive angle of a sweep.
 
@@ -40,12 +40,6 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
         Result of `tactile_bayes.sensitivity`, or its group "amplification".
     sweep : int
         Number of the sweep.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument does not hold that group, or there is no such sweep.
 
     Examples
     --------
@@ -92,6 +86,7 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     return ax
 
 
+@plot("the argument does not hold that group")
 def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> Axes:
     """Draw the leverage of every reading over the drive angle, by channel and direction.
 
@@ -103,12 +98,6 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     ----------
     found : xr.Dataset or xr.DataTree
         Result of `tactile_bayes.sensitivity`, or its group "information".
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument does not hold that group.
 
     Examples
     --------
@@ -139,6 +128,7 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     return ax
 
 
+@plot("the argument does not hold that group, or the group does not hold the choice")
 def noise_shares(
     found: xr.Dataset | xr.DataTree,
     *,
@@ -164,12 +154,6 @@ def noise_shares(
         Error along the contour, or across it.
     sweep : int
         Number of the sweep.
-    ax : Axes, optional
-
-    Raises
-    ------
-    ParameterError
-        If the argument does not hold that group, or the group does not hold the choice.
 
     Examples
     --------

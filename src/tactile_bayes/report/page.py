@@ -11,13 +11,22 @@ from tactile_bayes.record import carried_sweeps, present_channels
 from tactile_bayes.report.background import background_of
 from tactile_bayes.report.contour_figure import contour_figure, gap_ends
 from tactile_bayes.report.findings import COMPARISON, Findings
-from tactile_bayes.report.frames import motion_of
-from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
 from tactile_bayes.report.overlay import note_of, overlay_table
-from tactile_bayes.report.readings_figure import readings_figure
-from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
+from tactile_bayes.report.readings_figure import motion_of, readings_figure
 from tactile_bayes.report.trust import trust_of
-from tactile_bayes.report.wording import PageTable, chance, fixed, percent, rows_of, sentence, shown_as, spread
+from tactile_bayes.report.wording import (
+    FORMULAS,
+    PageTable,
+    chance,
+    fixed,
+    is_direction,
+    meaning_of,
+    percent,
+    rows_of,
+    sentence,
+    shown_as,
+    spread,
+)
 from tactile_bayes.uncertainty.summary import shown_in
 
 
@@ -57,9 +66,6 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "all_readings": PageTable("The readings", heads, readings.rows, 0),
         "everything": _parameters(findings, mute=False) if any(map(is_direction, parameters)) else None,
         "approximations": str(attrs.get("approximations", "")),
-        "command": command_of(attrs),
-        "python": python_lines(attrs),
-        "hindrances": hindrances(attrs),
         "data": {"band": contour.band, "frames": readings.data},
     }
 

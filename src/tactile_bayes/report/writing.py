@@ -1,4 +1,4 @@
-"""Writing of the page: template, style and script in one file that loads nothing."""
+"""Writing of pages: template, style and script in one file that loads nothing."""
 
 from __future__ import annotations
 
@@ -7,20 +7,27 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.checks import check_function, check_path
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.errors import ParameterError, TactileBayesError
+from tactile_bayes.inference.experiment import contact_points
+from tactile_bayes.inference.result import record_of
+from tactile_bayes.report.contour_figure import ContourFindings, contour_figure
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.overlay import Laid, draw_overlay
-from tactile_bayes.report.page import page_of
+from tactile_bayes.report.page import page_of, parameter_cells
 from tactile_bayes.report.runs_page import folders_of, runs_page_of
+from tactile_bayes.report.wording import PageTable, is_direction, percent
 from tactile_bayes.runs.names import MANY, OVERLAY
 from tactile_bayes.tasks import refuse_replacing, write_atomically
+from tactile_bayes.uncertainty.summary import gap_if_any
 
 _ESCAPES = {code: f"\\u{code:04x}" for code in (ord("<"), ord(">"), ord("&"), 0x2028, 0x2029)}
 
@@ -171,3 +178,41 @@ def _policy(style: str, script: str) -> str:
 def _as_json(data: Any) -> str:
     """Return JSON in which no text can end the script element."""
     return json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).translate(_ESCAPES)
+
+
+def write_watch_page(
+    posterior: xr.DataTree,
+    numbers: xr.Dataset,
+    band: xr.Dataset | None,
+    path: Path,
+    *,
+    headline: str,
+    sentences: Sequence[str],
+    is_well: bool,
+    refresh: int | None,
+) -> None:
+    """Write the page of a record so far, which needs no network and no other file."""
+    family, probability = str(posterior.attrs["family"]), float(numbers.attrs["probability"])
+    contour = None
+    if band is not None:
+        record, contacts, edges = record_of(posterior), None, None
+        with suppress(TactileBayesError):  # as long as too little is known of the rig
+            contacts = contact_points(record, posterior)
+        with suppress(TactileBayesError):
+            edges = gap_if_any(posterior, probability)
+        contour = contour_figure(ContourFindings(posterior, record, contacts, band, edges, probability, None, None))
+    names = [name for name in numbers["quantity"].values if not is_direction(name)]
+    rows = [parameter_cells(numbers.sel(quantity=name), family) for name in names]
+    heads = ["quantity", "meaning", "unit", "estimate", f"{percent(probability)} from", "to"]
+    text = rendered(
+        "watch.html.jinja",
+        name=str(posterior.attrs["record_file"]),
+        headline=headline,
+        sentences=sentences,
+        refresh=refresh,
+        is_well=is_well,
+        contour=contour,
+        parameters=PageTable("Estimates are medians, intervals central", heads, rows, 3),
+    )
+    with write_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -26,9 +26,7 @@ ROD = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
 CONTOUR = Parabola(a=2.5, q=0.1)  # profile II of the paper at q = 0.5, for a rod of 200 mm [m]
 # A small six-axis cell: 3 mN and 0.25 mN m, or 0.049 EI/L² and 0.021 EI/L.
 LOAD_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
-TRUTH = {"a": 2.5, "q": 0.1, "x_c": 0.0, "noise_scale": 1.0}
-
-
+TRUTH = {**vars(CONTOUR), "noise_scale": 1.0}
 RIG = Rig(rod=ROD, load_cell=LOAD_CELL, unknown="nothing")  # the rig as it is stated
 
 

@@ -21,8 +21,8 @@ from tactile_bayes.uncertainty.summary import summary
 
 
 @dataclass(frozen=True)
-class RigRun(Run[Rig]):
-    """A calibrated rig, with the verdicts on each record, and what later records take over."""
+class RigRun(Run[xr.DataTree]):
+    """The posterior of a calibrated rig, with the verdicts on each record, and what later records take over."""
 
     summary: xr.Dataset
     messages: tuple[str, ...]
@@ -57,4 +57,4 @@ def calibrate_rig_into(
             rig.write(temporary)
         folder.write_netcdf("posterior", "rig.nc", found)
         folder.write_summary(messages, numbers, found.attrs["message"])
-    return RigRun(rig, folder.files, numbers, tuple(messages))
+    return RigRun(found, folder.files, numbers, tuple(messages))

@@ -1,4 +1,4 @@
-"""A comparison of families, in one folder."""
+"""Verdicts, each in one folder: a calibration, the trust in a run, and a comparison of families."""
 
 from __future__ import annotations
 
@@ -7,18 +7,51 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from tactile_bayes import plotting
+from tactile_bayes.assessment.trust import trust
+from tactile_bayes.calibration.calibrate import calibrate
+from tactile_bayes.calibration.replicate import REPLICATES
 from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.runs.folder import Folder, Run
-from tactile_bayes.runs.names import COMPARISON
+from tactile_bayes.runs.folder import Folder, Run, posterior_in
+from tactile_bayes.runs.names import CALIBRATION, COMPARISON, TRUST
 
+REPLICATES_FOLDER = "trust"  # subfolder of the replicates, from which a stopped run resumes
 _WIDTHS = {0.5: "probability_half_width", 2.0: "probability_twice_width"}
+
+
+def calibrate_into(out: str | os.PathLike[str], **options: Any) -> Run[xr.Dataset]:
+    """Calibrate, and write the result to a folder."""
+    found = calibrate(out=out, **options)
+    with Folder(out, CALIBRATION) as folder:
+        folder.files["replicates"] = folder.path / REPLICATES.file
+        folder.write_netcdf("calibration", "calibration.nc", found)
+        folder.write_lines("verdict", "verdict.txt", [found.attrs["verdict"]])
+        if np.any(found["ranks"].values >= 0):
+            folder.draw("ranks", "ranks.png", plotting.calibration_ranks, found)
+        folder.draw("coverage", "coverage.png", plotting.coverage, found)
+    return Run(found, folder.files)
+
+
+def trust_into(
+    run: str | os.PathLike[str], out: str | os.PathLike[str] | None = None, **options: Any
+) -> Run[xr.Dataset]:
+    """Judge the posterior of a run, and write the result."""
+    path = posterior_in(Path(run))
+    place = path.parent if out is None else Path(out)
+    found = trust(path, out=place / REPLICATES_FOLDER, **options)
+    with Folder(place, TRUST) as folder:
+        folder.write_netcdf("trust", "trust.nc", found)
+        folder.write_lines("words", "trust.txt", (found.attrs["summary"], "", *found.attrs["words"].splitlines()))
+        if "assumption" in found.dims:
+            folder.draw("figure", "assumptions.png", plotting.assumptions, found)
+    return Run(found, folder.files)
 
 
 def compare_into(

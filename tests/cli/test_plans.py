@@ -1,6 +1,8 @@
-"""The command `sensitivity`, as a user calls it."""
+"""The commands `sensitivity` and `design`, as a user calls them."""
 
+import csv
 import importlib
+import re
 from functools import partial
 
 import numpy as np
@@ -10,7 +12,7 @@ import xarray as xr
 import tactile_bayes as tb
 from helpers import commands
 from tactile_bayes.planning.error_map import CellOutcome
-from tactile_bayes.runs import sensitivity as sensitivity_run
+from tactile_bayes.runs import plans as sensitivity_run
 
 error_map_module = importlib.import_module("tactile_bayes.planning.error_map")
 
@@ -39,8 +41,7 @@ def few_samples():
 def done(tmp_path_factory, coarse_pictures):
     """An analysis with a study, and what was said of it."""
     out = tmp_path_factory.mktemp("sensitivity") / "run"
-    result = succeed("--out", out, *STUDY, *QUICK)
-    return out, result.stdout
+    return out, succeed("--out", out, *STUDY, *QUICK)
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +71,8 @@ def asked(monkeypatch, analysed):
 
 
 def test_words_come_first_then_bounds_then_the_files(done, analysed):
-    out, said = done
-    words, table, files = said.split("\n\n")
+    out, result = done
+    words, table, _ = result.stdout.split("\n\n")
     assert words.splitlines() == (out / "words.txt").read_text(encoding="utf-8").splitlines()
     assert words == analysed.attrs["words"]
     rows = [line.split() for line in table.splitlines()]
@@ -83,18 +84,12 @@ def test_words_come_first_then_bounds_then_the_files(done, analysed):
         scale = np.degrees(1.0) if row[-1] == "°" else 1.0
         assert row[1:3] == [f"{scale * float(of.value):.3g}", f"{scale * float(of.bound_with_priors):.3g}"]
     assert rows[1 + list(told.parameter.values).index("drive_angle_offset")][-1] == "°"
-    paths = dict(line.split(maxsplit=1) for line in files.splitlines())
-    parts = {name.removesuffix(".png") for name in FIGURES}
-    assert set(paths) == {"sensitivity", "words", "cells", "study", "errors"} | parts
-    assert all(path.startswith(str(out)) for path in paths.values())
+    names = {"sensitivity.nc", "words.txt", "cells.json", "study.nc", "study.png"} | FIGURES
+    commands.assert_files(result, out, names)
 
 
 def test_files_hold_what_was_found(done, analysed):
     out, _ = done
-    assert {path.name for path in out.iterdir()} == {"sensitivity.nc", "words.txt", "study", *FIGURES}
-    assert {path.name for path in (out / "study").iterdir()} == {"cells.json", "study.nc", "study.png"}
-    for path in [*out.glob("*.png"), out / "study" / "study.png"]:
-        assert path.read_bytes().startswith(b"\x89PNG")
     with xr.open_datatree(out / "sensitivity.nc", engine="h5netcdf") as kept:
         assert kept.attrs["words"] == analysed.attrs["words"]
         for name, group in analysed.children.items():
@@ -176,3 +171,57 @@ def test_no_rod_that_serves_is_said():
     words = sensitivity_run.rod_message(rods)
     assert words.startswith("None of 2 rods ")
     assert words.endswith("(1 {}, 1 {}).".format(*statuses))
+
+
+ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--draws", "2"]
+
+
+@pytest.fixture(scope="module")
+def drives_asked(as_stated):
+    return (*ASKED, "--rig", as_stated, "--workers", 1)
+
+
+@pytest.fixture(scope="module")
+def made(drives_asked, tmp_path_factory, coarse_pictures):
+    out = tmp_path_factory.mktemp("design")
+    return commands.succeed(*drives_asked, "--out", out, "--quiet"), out
+
+
+def test_it_says_where_and_writes_what_it_found(made):
+    result, out = made
+    assert result.stdout.startswith("Put the pivot at (")
+    commands.assert_files(result, out, ["candidates.csv", "design.nc", "design.png", "words.txt"])
+    found = xr.load_dataset(out / "design.nc", engine="h5netcdf")
+    table = np.genfromtxt(out / "candidates.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(table["width"], found.width.values, rtol=1e-8)
+    np.testing.assert_allclose(table["base_x"], [0.0, 0.2])
+
+
+def test_drives_that_carry_the_base_are_candidates(drives_asked, tmp_path):
+    poses = tmp_path / "poses.csv"
+    poses.write_text("x,y,drive_angle\n0.8,0,65\n0,0.05,85\n-0.8,0,115\n")
+    answer = commands.answered(*drives_asked, "--carry", "0.8,0,180,65,1.6", "--carry", poses, "--out", tmp_path)
+    candidates = answer["candidates"]
+    assert answer["words"][0].startswith("Put the pivot")
+    assert [one["is_pivot"] for one in candidates] == [True, True, False, False]
+    assert candidates[0]["nested_width"] is None
+    assert candidates[3]["drive"] == "carried from (0.8, 0) to (-0.8, 0) at 65° to 115°"
+    assert candidates[0]["samples"] > candidates[2]["samples"] > 20
+    with (tmp_path / "candidates.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["drive"] for row in rows] == [one["drive"] for one in candidates]
+    np.testing.assert_allclose([float(row["width"]) for row in rows], [one["width"] for one in candidates], rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("nested", "told"),
+    [([], "nothing was written.*starts again"), (["--nested"], "no further candidate.*resumes")],
+)
+def test_an_interrupt_says_what_the_same_command_does(drives_asked, tmp_path, monkeypatch, nested, told):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tactile_bayes.runs.plans.design_into", interrupted)
+    result = commands.call(*drives_asked, "--out", tmp_path, *nested)
+    assert result.exit_code == 130
+    assert re.fullmatch(f"tactile-bayes: interrupted, {told}\n", result.stderr)

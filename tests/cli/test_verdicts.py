@@ -1,14 +1,19 @@
-"""The command `compare`: what it prints, writes and refuses."""
+"""The commands `compare` and `trust`: what they print, write and refuse, and what the report says of it."""
 
 import pandas as pd
 import pytest
 import xarray as xr
 
+from helpers import commands
 from helpers.commands import call
 from helpers.comparisons import NAMES, made_up
+from helpers.contour_posteriors import posterior
+from helpers.report_pages import Page
 from tactile_bayes.inference.ensembles import Progress
+from tactile_bayes.inference.result import write_result
 from tactile_bayes.record.netcdf import RESULT_FORMAT
-from tactile_bayes.runs import comparison as comparison_run
+from tactile_bayes.runs import verdicts as comparison_run
+from tactile_bayes.runs.names import OF_POSTERIOR
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -52,9 +57,7 @@ def test_the_verdict_comes_first_then_the_table_then_the_files(compared):
     assert rows(result.stdout)["circle"][-1] == "no"
     assert "not sampled: circle" in result.stdout
     assert "elpd" not in result.stdout
-    listed = result.stdout.split("\n\n")[-1].splitlines()
-    assert {line.split(maxsplit=1)[1] for line in listed} == {str(folder / name) for name in FILES}
-    assert {path.name for path in folder.iterdir()} == FILES
+    commands.assert_files(result, folder, FILES)
     stored = xr.load_dataset(folder / "comparison.nc", engine="h5netcdf")
     assert stored.attrs["verdict"] == result.stdout.splitlines()[0]
     assert stored.fits.dtype == bool
@@ -64,7 +67,6 @@ def test_the_verdict_comes_first_then_the_table_then_the_files(compared):
     assert all(kind.kind in "if" for kind in table.dtypes)
     for width, column in ((0.5, "probability_half_width"), (1.0, "probability"), (2.0, "probability_twice_width")):
         assert table[column].tolist() == stored.probability_by_width.sel(prior_width=width).values.tolist()
-    assert (folder / "families.png").read_bytes().startswith(b"\x89PNG\r\n")
 
 
 @pytest.mark.parametrize(
@@ -102,3 +104,45 @@ def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
     result = call("compare", record, "--out", tmp_path)
     assert "circle, step 50: R̂ 1.020, effective draws 300" in result.stderr
     assert "effective draws" not in result.stdout
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("trust") / "run"
+    folder.mkdir()
+    write_result(posterior(), folder / "posterior.nc")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(folder):
+    return commands.answered("trust", folder, "--replicates", 1, "--no-assumptions", "--workers", 1)
+
+
+def test_it_prints_one_object_and_writes_into_the_run(folder, written):
+    assert written["conclusion"] == "holds"
+    assert "0.95 holds" in written["words"][0]
+    assert written["parts"][0]["part"] == "sweep 1"
+    assert {claim["claim"] for claim in written["claims"]} >= {"pointwise_in_gap", "contact_region"}
+    assert written["files"] == {"trust": str(folder / "trust.nc"), "words": str(folder / "trust.txt")}
+    assert (folder / "trust.txt").read_text(encoding="utf-8").splitlines()[0] == written["words"][0]
+    names = {name for name in OF_POSTERIOR if (folder / name).exists()}
+    assert names == {"trust.nc", "trust.txt", "trust/replicates.json"}
+
+
+@pytest.mark.usefixtures("written")
+def test_the_report_states_it(folder):
+    assert commands.call("report", folder).exit_code == 0
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    assert any("band hold" in words for words in page.texts["h3"])
+    assert (folder / "trust.txt").read_text(encoding="utf-8").splitlines()[0] in page.texts["p"]
+    assert any(caption.startswith("Prediction of the rest") for caption in page.texts["caption"])
+
+
+@pytest.mark.usefixtures("written")
+def test_the_report_refuses_that_of_another_posterior(folder, tmp_path):
+    tree = posterior().copy()
+    tree["posterior"] = tree["posterior"].to_dataset() * 1.0000001
+    write_result(tree, tmp_path / "posterior.nc")
+    (tmp_path / "trust.nc").write_bytes((folder / "trust.nc").read_bytes())
+    commands.assert_refused(commands.call("report", tmp_path), "another posterior")

@@ -1,24 +1,28 @@
-"""The command `scan`: the loads at the base of an ideal rod along a contour."""
+"""The commands `scan` and `measure`: the loads at the base of an ideal rod, and what a load cell reads of them."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
+
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, table_of
-from tactile_bayes.cli.command import Output, Writes
+from tactile_bayes.cli.command import Output, Seed, Writes
 from tactile_bayes.cli.progress import step_bar
-from tactile_bayes.cli.rig_options import RigFile
+from tactile_bayes.cli.rigs import NoiseOptions, RigFile
 from tactile_bayes.cli.scan_options import ContourOptions, Directions, DriveOptions, Pivots
 from tactile_bayes.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.sweep import Event, Scan
 
 RecordFile = Annotated[Path, "File for the record, .csv or .nc; its folder is created if missing.", Writes()]
@@ -45,16 +49,12 @@ def scan(
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.mechanics.rods.rod import Rod
-        from tactile_bayes.record import write_record
-        from tactile_bayes.sweep import scan as sweep
-
         stated = rig.stated
         rod = stated.known_rod
-        made = sweep(choice.contour(stated.rod or Rod()), stated, drive=drive.drives(base, direction))
+        made = tb.scan(choice.contour(stated.rod or tb.Rod()), stated, drive=drive.drives(base, direction))
         show(1, 3 if figure else 2)
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_record(made.record, out)
+        tb.write_record(made.record, out)
         files = {"record": out}
         if figure is not None:
             show(2, 3)
@@ -74,7 +74,7 @@ def refuse_other_suffix(path: Path, known: tuple[str, ...] = (".csv", ".nc"), wh
         raise ParameterError(f"{above} is a file, and no folder for {path.name}: give {what} another name")
 
 
-def _headline(made: Scan, rod: Rod) -> str:
+def _headline(made: Scan, rod: tb.Rod) -> str:
     sweeps = len(made.sweeps)
     units = "in units of the rod (L, EI/L, EI/L²)"
     if not rod.is_dimensionless:
@@ -85,13 +85,12 @@ def _headline(made: Scan, rod: Rod) -> str:
     )
 
 
-def _table(made: Scan, rod: Rod) -> Table:
+def _table(made: Scan, rod: tb.Rod) -> Table:
     """Return first contact, phase changes and snap-off of every sweep, in this order."""
-    from tactile_bayes.record import carried_sweeps
 
     scale, units = (1.0, ("", "", "")) if rod.is_dimensionless else (1e3, (" [mm]", " [mN m]", " [mN]"))
     length, moment, force = units
-    carried = carried_sweeps(made.record)
+    carried = tb.record.carried_sweeps(made.record)
     rows = []
     for number, sweep in enumerate(made.sweeps):
         named = [(f"{number} {sweep.direction}", f"first contact ({sweep.first_contact.kind})", sweep.first_contact)]
@@ -116,12 +115,10 @@ def _ending(event: Event) -> str:
     return ways.get(event.kind, f"snap-off ({event.kind})")
 
 
-def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
+def _numbers(made: Scan, rod: tb.Rod, files: Mapping[str, Path]) -> dict[str, Any]:
     from dataclasses import asdict
 
-    from tactile_bayes.record import carried_sweeps
-
-    carried = carried_sweeps(made.record)
+    carried = tb.record.carried_sweeps(made.record)
     return {
         "contour": str(made.contour),
         "units": made.record.attrs["units"],
@@ -136,19 +133,78 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
 
 def _draw(made: Scan, path: Path) -> None:
     """Draw rods of every sweep from the first pivot and of sweeps in which the base is carried, and the loads below."""
-    from tactile_bayes import plotting
     from tactile_bayes.plotting.style import own_style, save_figure
-    from tactile_bayes.record import carried_sweeps
-    from tactile_bayes.tasks import write_atomically
 
-    carried = carried_sweeps(made.record)
+    carried = tb.record.carried_sweeps(made.record)
     shown = [n for n, sweep in enumerate(made.sweeps) if sweep.base == made.sweeps[0].base or n in carried]
-    with own_style(), write_atomically(path) as temporary:
+    with own_style(), tb.tasks.write_atomically(path) as temporary:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(7.0, 5.0 + 3.4 * len(shown)), layout="constrained")
         parts: Any = figure.subfigures(2, 1, height_ratios=(3.4 * len(shown), 5.0))
         for number, ax in zip(shown, parts[0].subplots(len(shown), 1, squeeze=False)[:, 0], strict=True):
-            plotting.rods(made, sweep=number, ax=ax)
-        plotting.observables(made.record, events=made.events, axes=parts[1].subplots(3, 1, sharex=True))
+            tb.plotting.rods(made, sweep=number, ax=ax)
+        tb.plotting.observables(made.record, events=made.events, axes=parts[1].subplots(3, 1, sharex=True))
         save_figure(figure, temporary, path.suffix[1:])
+
+
+def measure(
+    *,
+    record: Annotated[Path, "Ideal record, .csv or .nc, as scan writes it.", typer.Argument()],
+    out: RecordFile,
+    rig: RigFile,
+    noise: NoiseOptions,
+    keep_truth: Annotated[bool, "Keep the columns of the truth, which a laboratory does not have."] = False,
+    seed: Seed = 1,
+    output: Output,
+) -> Answer:
+    """Measure an ideal record with a real load cell: noise, bias, drift, gain, lever, range, resolution and encoder.
+
+    The cell is that of rig.toml, [load_cell], with the errors that are known, [unknown]; the file states the data
+    sheets alone, as one from a laboratory does. A record whose header states a load cell is refused, since it would
+    have noise twice; a record without one is assumed to be ideal.
+    """
+    refuse_other_suffix(out)
+    from tactile_bayes.rig.parameters import GROUPS
+    from tactile_bayes.rig.stated import cell_with
+
+    stated = rig.stated
+    cell = noise.in_place_of(stated.load_cell) or tb.LoadCell()
+    with step_bar(output.is_silent) as show:
+        ideal = tb.read_record(record)
+        if tb.LoadCell.from_record(ideal) is not None:
+            raise ParameterError(
+                f"{record} has been measured already (its header states a load cell), and would have noise twice: "
+                "give the ideal record, as scan writes it"
+            )
+        drifts = [stated.known.get(name, 0.0) for name in GROUPS["drift"]]
+        if not cell_with(cell, stated.known).entries() and not any(drifts):
+            raise ParameterError(
+                "this load cell is ideal, and changes nothing: state a flaw of it under [load_cell] of rig.toml, or "
+                "give --force-noise 0.05 --moment-noise 0.02"
+            )
+        show(1, 2)
+        measured = replace(stated, load_cell=cell).measure(ideal, rng=seed)
+        if not keep_truth:
+            measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
+        out.parent.mkdir(parents=True, exist_ok=True)
+        tb.write_record(measured, out)
+    truth = "with the columns of the truth" if keep_truth else "without columns of the truth"
+    samples, files = measured.sizes["sample"], {"record": out}
+    words = f"{samples} samples, {truth}; the load cell, which the file states:"
+    numbers = {"samples": samples, "units": measured.attrs["units"], "seed": seed, "truth": keep_truth, "files": files}
+    return Answer(
+        [words, *_sheet(cell.entries(), measured), "", files], lambda: {**numbers, "load_cell": cell.entries()}
+    )
+
+
+def _sheet(entries: dict[str, float | str], measured: xr.Dataset) -> list[str]:
+
+    lines = []
+    for name, value in entries.items():
+        unit = tb.record.LOAD_CELL_UNITS.get(name, "1")
+        if measured.attrs["units"] != "SI" and unit != "rad":
+            unit = "1"
+        shown = value if isinstance(value, str) else f"{value:.6g}"
+        lines.append(f"  {name.replace('_', ' '):<40} {shown}{'' if unit == '1' else ' ' + unit}")
+    return lines

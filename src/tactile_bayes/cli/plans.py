@@ -1,20 +1,22 @@
-"""The command `sensitivity`: the load cell that a measurement requires."""
+"""The commands `design` and `sensitivity`: the best drive for the next record, and the load cell that it requires."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+import tactile_bayes as tb
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
-from tactile_bayes.cli.command import Out, Output, Seed, Writes
+from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, step_bar
-from tactile_bayes.cli.rig_options import RigFile
-from tactile_bayes.cli.scan_options import Pivots, pivots_in
+from tactile_bayes.cli.rigs import RigFile
+from tactile_bayes.cli.scan_options import CarryOptions, Pivots, pivots_in
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.runs.names import SENSITIVITY
+from tactile_bayes.runs.names import DESIGN, SENSITIVITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,8 +24,105 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.rig import Rig
-    from tactile_bayes.runs.sensitivity import Material, SensitivityRun
+    from tactile_bayes.runs.plans import Material, SensitivityRun
+    from tactile_bayes.sweep import Carried, Drive
+
+
+def design(
+    *,
+    out: Annotated[Out, Writes((*DESIGN, "nested/*"))],
+    run: Annotated[
+        Path | None,
+        "Folder of a run of infer, or its posterior.nc, as present knowledge; else the prior.",
+        typer.Argument(),
+        Reads(("posterior.nc",)),
+    ] = None,
+    family: Annotated[str, "Shape of the contours, if only a prior is known."] = "parabola",
+    base: Annotated[
+        list[str] | None,
+        "A pivot to choose from, X,Y [m, or L]; may be repeated. By default, without --carry, eleven across at three "
+        "heights.",
+    ] = None,
+    drive_step: Annotated[list[float] | None, "A step of the drive to choose from [degrees]; by default 2."] = None,
+    criterion: Annotated[
+        Literal["band", "gap", "information"], "The narrowest band, the smallest gap, or the most information."
+    ] = "band",
+    nested: Annotated[
+        bool, "Sample each candidate's posteriors as well, which takes longer; the same command resumes a stopped run."
+    ] = False,
+    draws: Annotated[int, "Number of objects drawn from posterior or prior.", typer.Option(min=2)] = 24,
+    carries: CarryOptions,
+    rig: RigFile,
+    work: WorkerOptions,
+    seed: Seed = 1,
+    output: Output,
+) -> Answer:
+    """Choose the drive of the next record, so that the contour's band becomes narrowest.
+
+    Candidates are pivots (--base) and drives that carry the base (--carry), each with every --drive-step.
+    """
+    import numpy as np
+
+    from tactile_bayes.runs.plans import design_into
+
+    options: dict[str, Any] = {}
+    known: xr.DataTree | str = family
+    if run is not None:
+        if rig.rig is not None:
+            raise ParameterError("a run has its rig: leave out --rig, or the run")
+        known = _posterior(run)
+    else:
+        options = {"rig": rig.stated}
+    steps = np.radians(drive_step or [2.0]).tolist()
+    if base or carries.carry:
+        drives: list[Drive] = [
+            tb.Rotation(pivot, drive_step=step) for pivot in pivots_in(base) for step in steps if base
+        ]
+        drives += [_as_often(drive, step) for drive in carries.carried() for step in steps]
+    else:
+        usual = [tb.planning.usual_drives(known, options.get("rig"), step) for step in steps]
+        drives = [drive for each in zip(*usual, strict=True) for drive in each]
+
+    where = out / "nested" if nested else None
+    then = f"the same command {'resumes' if nested else 'starts again'}"
+    with resumable_bar("candidate", output.is_silent, where, len(drives), then=then) as note:
+        made = design_into(
+            out,
+            known,
+            rng=seed,
+            drives=drives,
+            criterion=criterion,
+            nested=nested,
+            draws=draws,
+            workers=work.reporting(note),
+            **options,
+        )
+    words = made.files["words"].read_text(encoding="utf-8").splitlines()
+    found = made.result
+    columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
+    return Answer.of(
+        words,
+        made.files,
+        best=int(found.best),
+        present_width=float(found.present_width),
+        candidates=found[columns].to_dataframe()[columns].to_dict("records"),
+    )
+
+
+def _as_often(drive: Carried, step: float) -> Carried:
+    """Return a drive with as many samples as a rotation of a step [rad]."""
+    from tactile_bayes.sweep import blind_angles
+
+    given: Any = drive
+    made: Carried = replace(given, drive_step=float(drive.travels[-1]) / (blind_angles(step).size - 1))
+    return made
+
+
+def _posterior(run: Path) -> xr.DataTree:
+    from tactile_bayes.runs.folder import posterior_in
+
+    is_the_file = run.is_file() or (run.suffix == ".nc" and not run.exists())
+    return tb.read_result(run if is_the_file else posterior_in(run))
 
 
 def sensitivity(
@@ -67,26 +166,23 @@ def sensitivity(
 
     The same command resumes a stopped study.
     """
-    from tactile_bayes.contours import paper_profile
-    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.planning.plan import enlarged
-    from tactile_bayes.runs.sensitivity import sensitivity_into, steps_of
-    from tactile_bayes.sweep import Rotation
+    from tactile_bayes.runs.plans import sensitivity_into, steps_of
 
     profiles, distances = profile or ["II"], distance or [0.5]
     if not replicates:
         _refuse_without_study(profiles, distances, noise_factor, work)
     stated = rig.stated
     for name in profiles:
-        paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
+        tb.contours.paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
     common: dict[str, Any] = {"rig": stated, "rng": seed}
-    drives = [Rotation(pivot, drive_step=math.radians(drive_step)) for pivot in pivots_in(base)]
+    drives = [tb.Rotation(pivot, drive_step=math.radians(drive_step)) for pivot in pivots_in(base)]
     material = _material(stated) if best_rod else None
     first: Any = profiles[0]
     analysis = {
         **common,
         "material": material,
-        "contour": enlarged(paper_profile(first, q=distances[0]), (stated.rod or Rod()).length),
+        "contour": enlarged(tb.contours.paper_profile(first, q=distances[0]), (stated.rod or tb.Rod()).length),
         "drive": drives,
         "band_widths": band_width or None,
     }
@@ -124,10 +220,10 @@ def _refuse_without_study(
             raise ParameterError(f"{option} is for a study: give --replicates as well, like --replicates 20")
 
 
-def _material(rig: Rig) -> Material:
+def _material(rig: tb.Rig) -> Material:
     """Return the material of a rig's rod, of Young's modulus EI / (π d⁴ / 64)."""
     from tactile_bayes.mechanics.rods.rod import round_rigidity
-    from tactile_bayes.runs.sensitivity import Material
+    from tactile_bayes.runs.plans import Material
 
     rod = rig.rod
     if rod is None or rod.is_dimensionless or not rod.diameter or rod.elastic_strain is None:
@@ -141,16 +237,15 @@ def _material(rig: Rig) -> Material:
 
 
 def _answer(run: SensitivityRun) -> Answer:
-    from tactile_bayes.runs.sensitivity import rod_message
+    from tactile_bayes.runs.plans import rod_message
 
     words = run.result.attrs["words"].splitlines()
     if run.rods is not None:
         words.append(rod_message(run.rods))
-    table = _table(run.result["information"].to_dataset())
-    return Answer([*words, "", table, "", run.files], lambda: _numbers(run, words))
+    return Answer.of(words, run.files, _bounds(run.result["information"].to_dataset()), **_numbers(run))
 
 
-def _table(information: xr.Dataset) -> Table:
+def _bounds(information: xr.Dataset) -> Table:
     from tactile_bayes.uncertainty.summary import shown_in
 
     rows = []
@@ -161,12 +256,11 @@ def _table(information: xr.Dataset) -> Table:
     return table_of(["parameter", "value", "known to ±", "unit"], rows, left=["parameter", "unit"])
 
 
-def _numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any]:
+def _numbers(run: SensitivityRun) -> dict[str, Any]:
     """Return the main results for JSON."""
     found = run.result
     information, needed = found["information"].to_dataset(), found["required_noise"].to_dataset()
     answer: dict[str, Any] = {
-        "words": words,
         **{name: found.attrs[name] for name in ("contour", "units", "rod_length", "rod_flexural_rigidity")},
         **{name: float(found.attrs[name]) for name in ("force_noise", "moment_noise")},
         "parameters": {
@@ -182,7 +276,6 @@ def _numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any]:
             {name: needed[name][i] for name in ("band_width", "noise_factor", "force_noise", "moment_noise")}
             for i in range(needed.sizes["band_width"])
         ],
-        "files": run.files,
     }
     if run.rods is not None:
         answer["rod"] = {name: run.rods[f"best_{name}"] for name in ("length", "diameter", "width")}
