@@ -11,8 +11,7 @@ from scipy.stats import binom, chi2
 from helpers.refusals import refused
 from tactile_bayes import scan
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
-from tactile_bayes.contours.bends import FALSE_ALARM, Bends, refuse_two_bands
-from tactile_bayes.contours.points import _FLOOR, from_points
+from tactile_bayes.contours.points import _FLOOR, FALSE_ALARM, Bends, from_points, refuse_two_bands
 from tactile_bayes.errors import ContourError
 
 ARCS = {

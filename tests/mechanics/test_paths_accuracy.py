@@ -236,14 +236,14 @@ def shot(scene, angle, parameter, force, rest, tip, friction_angle=0.0):
 
 def shot_at(scene, paths, angle, states, k):
     """Loads by shooting, from some way off; from nearer where the shot hits the other equilibrium, beyond the fold."""
-    w = states.wrench
+    w, delta = states.wrench, paths.sweeps.friction_angle[0]
     tip = w.contact_arclength[k] == 1.0
     force = float(np.hypot(w.force_x[k], w.force_y[k]))
     for off in (0.1, 0.03, 0.01):
         rest = w.tip_angle[k] + 0.1 * off * (w.drive_angle[k] - w.tip_angle[k]) if tip else 1.0 - 0.2 * off
         rest = float(rest if tip else rest * w.contact_arclength[k])
         parameter = states.parameter[k] + off * (states.parameter[k] - paths.snap_parameter[0])
-        loads, found = shot(scene, angle, parameter, (1.0 + 0.2 * off) * force, rest, tip, paths.friction_angle[0])
+        loads, found = shot(scene, angle, parameter, (1.0 + 0.2 * off) * force, rest, tip, delta)
         if found > paths.snap_parameter[0]:
             return loads
     raise AssertionError("no shot hit an equilibrium on the path")

@@ -24,11 +24,9 @@ def turned_sweeps(measured: xr.Dataset, load_cell: LoadCell) -> set[int]:
 
 
 def drive_histories(measured: xr.Dataset, backward: Flags, load_cell: LoadCell, *, rubs: bool) -> Index:
-    """Return the number of each sample's history, shape (samples,), one more than its first sweep; 0 if it has none.
-
-    A sweep that carries the base has its own. If the rod `rubs` on the object, so has a sweep whose drive angle turns
-    back, and one that goes back in contact, `backward` against its direction, goes on with the sweep before it.
-    """
+    """Return the number of each sample's history, shape (samples,), one more than its first sweep; 0 if it has none. A
+    sweep that carries the base has its own. If the rod `rubs` on the object, so has a sweep whose drive angle turns
+    back, and one that goes back in contact, `backward` against its direction, goes on with the sweep before it."""
     sweep, carried = measured.sweep.values, carried_sweeps(measured)
     found = np.where(np.isin(sweep, carried), sweep + 1, 0)
     if not rubs:

@@ -169,9 +169,7 @@ def _between(table: Floats, cell: int, axis: int, t: float) -> tuple[float, floa
 @compiled
 def _by_cell(table: Floats, p: float) -> tuple[float, float, float, float, float]:
     """Point, slope angle, and rates of arc length and slope angle, by Chebyshev series in the contour's own parameter.
-
-    A row holds the beginning and the end of its cell, and the coefficients of x, y and slope angle.
-    """
+    A row holds the beginning and the end of its cell, and the coefficients of x, y and slope angle."""
     first, last = 0, table.shape[0] - 1
     while first < last:
         middle = (first + last + 1) // 2
@@ -239,11 +237,8 @@ def over(outline: Outline, arclength: float, x: float, low: float, high: float) 
 
 @compiled
 def ends(outline: Outline) -> tuple[float, float]:
-    """Least and greatest parameter.
-
-    Where the outline has no end, or one so far away that rounding hides its direction, it is cut just beyond the rod's
-    reach.
-    """
+    """Least and greatest parameter. Where the outline has no end, or one so far away that rounding hides its direction,
+    it is cut just beyond the rod's reach."""
     return _end(outline, -1.0), _end(outline, 1.0)
 
 

@@ -260,11 +260,8 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 
 @compiled
 def _clear_angle(scene: Scene, lines: Floats | None, event: Any, accuracy: Accuracy) -> float:
-    """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not.
-
-    A rod that is released touches there without load, which small errors alone would decide: −∞ if it does so nowhere
-    else.
-    """
+    """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not. A rod that is
+    released touches there without load, which small errors alone would decide: −∞ if it does so nowhere else."""
     if lines is None:
         clear = clear_angle(scene.outline, scene.beam, accuracy.first_step)
         return -math.inf if event.snap_off == _RELEASE and clear < event.snap_angle + _SAME_ANGLE else clear
@@ -301,12 +298,9 @@ def _solve(
     event_states: Any,
     events: Any,
 ) -> None:
-    """Follow the path of every sweep, and write the results of its samples.
-
-    Sweeps are a structured array with fields as in `Sweeps`; loads and the last three are as in `Solutions`, but
-    structured. Room is for the lines of one sweep, `table` for that of one contour, and the finer workspace for paths
-    that the other leaves in doubt.
-    """
+    """Follow the path of every sweep, and write the results of its samples. Sweeps are a structured array with fields
+    as in `Sweeps`; loads and the last three are as in `Solutions`, but structured. Room is for the lines of one sweep,
+    `table` for that of one contour, and the finer workspace for paths that the other leaves in doubt."""
     count, knots, accuracy = shapes.knots.shape[1], workspace.knots, workspace.leg.accuracy
     for i in range(sweeps.size):
         sweep, event, c = sweeps[i], events[i], sweeps[i].contour
@@ -342,14 +336,12 @@ def solve_sweeps(
     polished: bool = True,
     asks_clearance: bool = True,
 ) -> Solutions:
-    """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples.
-
-    `shape` is the number of contours, and of rows for each. With a `profile`, rest curvature or rigidity vary along the
-    rod, the same in all sweeps except for the taper and an addition to its rest curvature; `known` are tables of it,
-    for loads with errors of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and
-    EI/L²], at least 1e-10 of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest.
-    States are exact if `polished`; otherwise they come from the series, with an error of 1e-10 of the largest.
-    """
+    """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples. `shape` is the number of
+    contours, and of rows for each. With a `profile`, rest curvature or rigidity vary along the rod, the same in all
+    sweeps except for the taper and an addition to its rest curvature; `known` are tables of it, for loads with errors
+    of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10
+    of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest. States are exact if
+    `polished`; otherwise they come from the series, with an error of 1e-10 of the largest."""
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     else:

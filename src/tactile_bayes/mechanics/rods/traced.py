@@ -80,10 +80,8 @@ class TracedRod:
 
     def modes(self, count: int) -> Floats:
         """Coefficients of independent deviations of the rest curvature, each its standard deviation, shape (count, n).
-
         They are the principal components of the deflections ∫ (c − s) κ0 ds at points c: these are what a force there
-        feels of the curvature, whose work is that of the moment that the force causes.
-        """
+        feels of the curvature, whose work is that of the moment that the force causes."""
         points, weights = leggauss(2 * self.coefficients.size)
         each = np.eye(self.coefficients.size)
         deflections = chebyshev.evaluate(chebyshev.integral(chebyshev.integral(each)), 0.5 * (points + 1.0)[:, None])
@@ -95,10 +93,8 @@ class TracedRod:
 
 
 def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, length: float | None = None) -> TracedRod:
-    """Return the rest curvature of a rod from points traced along it, base first; see `Rod.from_shape`.
-
-    Beyond the last point, up to a given length, the curvature continues with its trend and a deviation that grows.
-    """
+    """Return the rest curvature of a rod from points traced along it, base first; see `Rod.from_shape`. Beyond the last
+    point, up to a given length, the curvature continues with its trend and a deviation that grows."""
     columns = [check_numbers(name, values, shape=(None,)) for name, values in (("x", x), ("y", y))]
     if columns[0].size != columns[1].size or columns[0].size < _FEWEST:
         raise ParameterError(
@@ -304,10 +300,8 @@ def _posterior(by: Floats, target: Floats, kernels: Sequence[Floats], scatter: f
 
 @functools.cache
 def _kernels(terms: int) -> list[Floats]:
-    """Offset, direction and Chebyshev coefficients of the curvature by white noise in orthonormal polynomials.
-
-    What level and trend leave of the curvature has a root mean square of one.
-    """
+    """Offset, direction and Chebyshev coefficients of the curvature by white noise in orthonormal polynomials. What
+    level and trend leave of the curvature has a root mean square of one."""
     fine = np.linspace(0.0, 1.0, _FINE)
     trend, found = np.vander(fine, 2), []
     for integrals in _INTEGRALS:
@@ -333,10 +327,8 @@ class _Fit(NamedTuple):
 
 
 def _fitted(given: Floats, scatter: float | None, whole: float | None = None) -> _Fit:
-    """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature.
-
-    Without the length of the whole rod it ends at the last point.
-    """
+    """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature. Without the
+    length of the whole rod it ends at the last point."""
     start = _start_of(given)
     length = start.length if whole is None else whole
     traced = start.length / length
