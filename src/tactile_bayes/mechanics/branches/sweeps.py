@@ -39,21 +39,13 @@ if TYPE_CHECKING:
 
 # Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force.
 _SAME_ANGLE = 1e-5
-_TOUCHES, _TOO_FAR, _BEGINS_INSIDE = (
-    int(reach) for reach in (Reachability.TOUCHES, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
-)
+_TOUCHES, _TOO_FAR = int(Reachability.TOUCHES), int(Reachability.TOO_FAR)
+_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 # Accuracy with states and events to rounding.
 _EXACT = Accuracy(
-    np.full(3, np.inf),
-    resolved=1e-9,
-    sharp=np.inf,
-    halvings=12,
-    first_step=4e-16,
-    last_step=4e-16,
-    polished=True,
-    exact=True,
+    np.full(3, np.inf), 1e-9, np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True, exact=True
 )
 _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)  # accuracy with events to rounding and states from series
 # Accuracy that noise requires, beside its tolerance.
@@ -148,14 +140,6 @@ class Solutions(NamedTuple):
 
 
 _INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")
-
-
-def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
-    """Sweeps as a structured array."""
-    out = np.empty(sweeps.contour.size, dtype=_SWEEP)
-    for name, values in zip(Sweeps._fields, sweeps, strict=True):
-        out[name] = values
-    return out
 
 
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
@@ -350,7 +334,9 @@ def solve_sweeps(
         if may_stick and np.any(sweeps.friction_angle):
             accuracy = accuracy._replace(last_step=_LAST_STEP_STUCK)
     count, rows = shape
-    sweep = _as_sweeps(sweeps)
+    sweep = np.empty(sweeps.contour.size, dtype=_SWEEP)
+    for name, values in sweeps._asdict().items():
+        sweep[name] = values
     loads, all_states = np.zeros((count, rows, 3)), np.zeros((count, rows if states else 0), dtype=STATE)
     event_states = np.zeros((sweep.size, MOST_CHANGES + 1 if states else 0), dtype=STATE)
     events = np.empty(sweep.size, dtype=_EVENTS)

@@ -203,16 +203,9 @@ def _refuse_backward(feet: Floats, scatter: float) -> None:
         )
 
 
-class _Guess(NamedTuple):
-    """A first guess."""
-
-    length: float
-    feet: Floats  # arc lengths of the points, over the length
-    slopes: Floats  # slopes of the rod at points of equal distance [rad]
-
-
-def _start_of(points: Floats) -> _Guess:
-    """Polynomials through the points by the length of the chain that they form."""
+def _start_of(points: Floats) -> tuple[float, Floats, Floats]:
+    """First guess of the length, the arc lengths of the points over it, and slopes at points of equal distance [rad],
+    from polynomials through the points by the length of the chain that they form."""
     chain = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
     chain /= chain[-1]
     x, y = (Chebyshev.fit(chain, column, 5, domain=[0.0, 1.0]).deriv() for column in points.T)
@@ -220,7 +213,7 @@ def _start_of(points: Floats) -> _Guess:
     arc = cumulative_trapezoid(np.hypot(x(z), y(z)), z, initial=0)
     slopes = np.unwrap(np.arctan2(y(z), x(z)))
     even = np.linspace(0.0, arc[-1], z.size)
-    return _Guess(float(arc[-1]), np.interp(chain, z, arc) / arc[-1], np.interp(even, arc, slopes))
+    return float(arc[-1]), np.interp(chain, z, arc) / arc[-1], np.interp(even, arc, slopes)
 
 
 class _Posterior(NamedTuple):
@@ -329,12 +322,12 @@ class _Fit(NamedTuple):
 def _fitted(given: Floats, scatter: float | None, whole: float | None = None) -> _Fit:
     """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature. Without the
     length of the whole rod it ends at the last point."""
-    start = _start_of(given)
-    length = start.length if whole is None else whole
-    traced = start.length / length
-    feet = traced * start.feet
+    own, feet, slopes = _start_of(given)
+    length = own if whole is None else whole
+    traced = own / length
+    feet = traced * feet
     terms, nodes, kernels = _TERMS, chebyshev.nodes(_TERMS), _kernels(_TERMS)
-    guess = Chebyshev.fit(np.linspace(0.0, traced, start.slopes.size), start.slopes, _FREE, domain=[0.0, 1.0])
+    guess = Chebyshev.fit(np.linspace(0.0, traced, slopes.size), slopes, _FREE, domain=[0.0, 1.0])
     offset, base, curvature = 0.0, float(guess(0.0)), np.zeros(terms)
     curvature[:_FREE] = guess.deriv().coef
     turns = chebyshev.integral(np.eye(terms))
