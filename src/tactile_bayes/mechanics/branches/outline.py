@@ -1,9 +1,8 @@
 """One contour in the sweep frame: relative to the pivot, in rod lengths, mirrored for a backward sweep.
 
 An outline consists of two halves of families with a formula, from a common vertex, or of a table. The rod's centreline
-stays half the rod's diameter outside the object: it traces the parallel curve, which is strictly convex too. A tapered
-rod is a cone of half angle ε. Its contact is stated by the arc length s at which the normal of its surface meets the
-centreline; there the centreline is (d/2 − s tan ε) cos ε from the object, with the diameter d at the base.
+stays half the rod's diameter outside the object, or as far as the `surface` of a tapered one says: it traces a curve
+that is strictly convex too.
 """
 
 from __future__ import annotations
