@@ -64,9 +64,7 @@ def steepest(contour):
 
 def size_of(contour):
     """How far a contour reaches from the origin, as far as it is tried: one rounding of that is the unit of errors.
-
-    Polynomials round all of them, height and slope, where they are steepest, tried or not.
-    """
+    Polynomials round all of them, height and slope, where they are steepest, tried or not."""
     ends = np.array(contour.derivatives(np.array(contour.domain))[:2]) if isinstance(contour, Graph) else 0.0
     return np.abs(contour.point(steepest(contour))).sum() + np.abs(ends).sum()
 
@@ -84,11 +82,8 @@ def apart(stops):
 
 
 def integrals(function, stops):
-    """Integrals of a function between neighbouring stops, and what they may be off.
-
-    By double-exponential quadrature, which does not mind powers at the stops. From level 6: two coarse levels in a row
-    agree by chance now and then.
-    """
+    """Integrals of a function between neighbouring stops, and what they may be off. By double-exponential quadrature,
+    which does not mind powers at the stops. From level 6: two coarse levels in a row agree by chance now and then."""
     found = tanhsinh(function, stops[:-1], stops[1:], atol=1e-14, rtol=1e-14, minlevel=6)
     return found.integral, 2.0 * found.error + 1e-14
 
@@ -236,10 +231,8 @@ MAKERS = {
 @FEW
 @given(data=st.data())
 def test_arrays_of_parameters_are_many_contours(make, data):
-    """Each equals the single contour of its own parameters, whichever way it is picked, but for rounding.
-
-    Some processors raise arrays to powers otherwise than numbers.
-    """
+    """Each equals the single contour of its own parameters, whichever way it is picked, but for rounding. Some
+    processors raise arrays to powers otherwise than numbers."""
     shape = data.draw(broadcastable_shapes((), max_dims=2, max_side=3), "shape")
     ranges = (0.3, 2.0), (0.3, 2.0), (1.1, 6.0), (0.1, 0.9), (-0.5, 0.5)
     a, b, n, q, x_c = (data.draw(arrays(float, shape, elements=st.floats(*ends), fill=st.nothing())) for ends in ranges)
@@ -296,16 +289,10 @@ def test_arrays_of_parameters_are_many_contours(make, data):
         (lambda: ShapeFree([-1, 0, 1e-6, 1], [0, 0, 1, 0], 0, 0.3), ["log_radius", "knots"]),
         (lambda: ShapeFree(KNOTS, np.zeros(5), 0, np.inf), ["ShapeFree", "x", "y"]),
         (lambda: ShapeFree(KNOTS, np.zeros(5), 0, 0.3, at=1.4), ["at = 1.4", "-1.3 to 1.3"]),
-        (lambda: from_function(np.sin, (-1, 1)), ["convex", "from x ="]),
-        (lambda: from_function(np.abs, (-1, 1)), ["absolute", "smooth", "Joined"]),
         (lambda: from_function(np.sqrt, (-1, 1)), ["sqrt", "nan", "domain"]),
         (lambda: from_function(np.square, (1, -1)), ["domain", "(1.0, -1.0)"]),
         (lambda: from_function(np.square, (-1, 1), slope=np.abs), ["slope", "curvature"]),
         (lambda: from_function(lambda x: 1.0, (-1, 1)), ["<lambda>", "()"]),
-        (
-            lambda: from_function(np.square, (-1, 1), slope=lambda x: 3 * x, curvature=lambda x: 3 + 0 * x),
-            ["g'", "derivative of g"],
-        ),
         (lambda: Parabola([0.5, 0.6], [0.1, 0.2, 0.3]), ["Parabola", "a", "(2,)", "q", "(3,)"]),
         (lambda: Joined(Parabola([1, 2], 0.3), Parabola([1, 2, 3], 0.3)), ["Joined", "left", "(2,)", "right", "(3,)"]),
         (lambda: ShapeFree(KNOTS, np.zeros(5), [0, 1], [0.1, 0.2, 0.3]), ["ShapeFree", "x", "(2,)", "y", "(3,)"]),

@@ -11,8 +11,7 @@ from scipy.stats import binom, chi2
 from helpers.refusals import refused
 from tactile_bayes import scan
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
-from tactile_bayes.contours.bends import FALSE_ALARM, Bends, refuse_two_bands
-from tactile_bayes.contours.points import _FLOOR, from_points
+from tactile_bayes.contours.points import _FLOOR, FALSE_ALARM, Bends, from_points, refuse_two_bands
 from tactile_bayes.errors import ContourError
 
 ARCS = {
@@ -45,10 +44,8 @@ def dented(depth, scatter, seed=0, count=100, at=0.3, half_width=0.15):
     ("name", "height", "radius"), [("parabola", 1e-14, 1e-11), ("circle", 1e-6, 1e-3), ("quartic", 2e-5, 0.03)]
 )
 def test_exact_points_are_followed(name, height, radius):
-    """Within few times what was found: heights 2e-15, 1e-7 and 6e-6, radii of curvature 2e-13, 3e-4 and 0.008.
-
-    Those of the quartic where it is not about to vanish, |x| > 0.2: no B-spline of x² has positive coefficients.
-    """
+    """Within few times what was found: heights 2e-15, 1e-7 and 6e-6, radii of curvature 2e-13, 3e-4 and 0.008. Those of
+    the quartic where it is not about to vanish, |x| > 0.2: no B-spline of x² has positive coefficients."""
     truth, left, right = ARCS[name]
     contour = from_points(*measured(truth, left, right))
     x = np.linspace(left, right, 1001)

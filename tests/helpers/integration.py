@@ -12,8 +12,11 @@ from scipy.optimize import root
 RTOL, ATOL = 1e-13, 1e-14
 
 
-def rod(wrench: tuple[float, float, float, float], length: float, *, stop_at_contact: bool = False):
-    """Solution from the pivot on: x, y, φ, κ, begun with (drive angle, holding moment, force_x, force_y)."""
+def rod(wrench, length: float, *, rest: float = 0.0, stop_at_contact: bool = False, **options):
+    """Solution from the pivot on: x, y, φ, κ, begun with (drive angle, holding moment, force_x, force_y).
+
+    `rest` is the curvature without load, the same everywhere.
+    """
     phi0, moment, fx, fy = (float(v) for v in wrench)
 
     def slope(_s: float, z: NDArray[np.float64]) -> list[float]:
@@ -24,10 +27,10 @@ def rod(wrench: tuple[float, float, float, float], length: float, *, stop_at_con
         return z[3]
 
     curvature.terminal = True
-    atol = ATOL * np.array([1.0, 1.0, 1.0, abs(moment)])
+    atol = ATOL * np.array([1.0, 1.0, 1.0, max(abs(moment), abs(rest))])
     events = curvature if stop_at_contact else None
-    start = [0.0, 0.0, phi0, -moment]
-    solution = solve_ivp(slope, (0.0, length), start, method="DOP853", rtol=RTOL, atol=atol, events=events)
+    start = [0.0, 0.0, phi0, rest - moment]
+    solution = solve_ivp(slope, (0.0, length), start, "DOP853", events=events, rtol=RTOL, atol=atol, **options)
     assert solution.success, solution.message
     return solution
 

@@ -29,6 +29,17 @@ def fit(case: Case) -> ContactFit:
     return fit_contacts(case.reading, case.delta)
 
 
+def misfit_of(z, case: Case):
+    """Sums of squares of contacts with the coordinates z."""
+    turned = z[:, 3] - case.reading.drive_angle
+    off = contact_states(z, case.delta).loads.T - case.reading.loads - case.reading.leaning * turned[:, None]
+    misfit = (off * np.linalg.solve(case.reading.covariance, off[..., None])[..., 0]).sum(axis=1)
+    if np.any(case.reading.angle_deviation):
+        return misfit + (turned / case.reading.angle_deviation) ** 2
+    np.testing.assert_array_equal(turned, 0.0)
+    return misfit
+
+
 def some_coordinates(count, rng, delta):
     """Contacts of both phases, a third of them close to the edge; the contour's slope is between −1 and 1."""
     tip = rng.random(count) < 0.5
@@ -63,11 +74,9 @@ def some_case(count, *, seed, noises=NOISES, encoder=False, correlated=False, fr
 
 
 class Reference:
-    """One sample's sum of squares over contacts at polar angle ϑ of a contour without slope, turned to fit the drive.
-
-    A contact is told by ϑ and how it touches: tangentially at arc length s ≤ 1; or with the tip, at a distance r that
-    has √(1 − r²) = t times what it is where the phases meet, t ≤ 1. With a noisy encoder the drive angle is the third.
-    """
+    """One sample's sum of squares over contacts at polar angle ϑ of a contour without slope, turned to fit the drive. A
+    contact is told by ϑ and how it touches: tangentially at arc length s ≤ 1; or with the tip, at a distance r that has
+    √(1 − r²) = t times what it is where the phases meet, t ≤ 1. With a noisy encoder the drive angle is the third."""
 
     def __init__(self, case: Case, k: int) -> None:
         reading = case.reading
@@ -77,17 +86,18 @@ class Reference:
         lean = np.concatenate([[1.0], reading.leaning[k]])
         covariance = self.sigma**2 * np.outer(lean, lean)
         covariance[1:, 1:] += reading.covariance[k]
-        if self.sigma:
-            self.root = np.linalg.cholesky(covariance)
-        else:
-            self.root = np.linalg.cholesky(covariance[1:, 1:])
+        self.root = np.linalg.cholesky(covariance if self.sigma else covariance[1:, 1:])
         self.widest = 0.5 * np.pi + self.delta
+
+    def contact(self, phase, theta, how):
+        """Distance and wrench of a contact."""
+        edge = 1.0 / tangential_arclength(np.cos(theta), np.sin(theta), 0.0, self.delta)
+        r = how * edge if phase == TANGENTIAL else np.sqrt(1.0 - how**2 * (1.0 - edge**2))
+        return r, wrench_from_contact(r * np.cos(theta), r * np.sin(theta), 0.0, self.delta, phase=phase)
 
     def misses(self, phase, theta, how, angle):
         """Deviations in standard deviations, shape (3 or 4, n)."""
-        edge = 1.0 / tangential_arclength(np.cos(theta), np.sin(theta), 0.0, self.delta)
-        r = how * edge if phase == TANGENTIAL else np.sqrt(1.0 - how**2 * (1.0 - edge**2))
-        w = wrench_from_contact(r * np.cos(theta), r * np.sin(theta), 0.0, self.delta, phase=phase)
+        _, w = self.contact(phase, theta, how)
         turn = angle - w.drive_angle
         fx = np.cos(turn) * w.force_x - np.sin(turn) * w.force_y
         fy = np.sin(turn) * w.force_x + np.cos(turn) * w.force_y
@@ -139,9 +149,7 @@ class Reference:
     def _place(self, phase, edge, values):
         theta, how = (values[0], 1.0) if edge else values[:2]
         angle = values[-1] if self.sigma else self.given[0]
-        reach = 1.0 / float(tangential_arclength(np.cos(theta), np.sin(theta), 0.0, self.delta))
-        r = how * reach if phase == TANGENTIAL else np.sqrt(1.0 - how**2 * (1.0 - reach**2))
-        w = wrench_from_contact(r * np.cos(theta), r * np.sin(theta), 0.0, self.delta, phase=phase)
+        r, w = self.contact(phase, theta, how)
         turn = angle - float(w.drive_angle)
         return np.array([r * np.cos(theta + turn), r * np.sin(theta + turn), turn, float(w.contact_arclength)])
 
@@ -176,15 +184,7 @@ def test_what_is_told_of_a_contact_is_true_of_it(kind):
     found = fit(case)
     z, tip = found.coordinates, found.phase == TIP
     assert np.isfinite(z).all()
-    turned = z[:, 3] - case.reading.drive_angle
-    off = contact_states(z, case.delta).loads.T - case.reading.loads - case.reading.leaning * turned[:, None]
-    weighed = np.linalg.solve(case.reading.covariance, off[..., None])[..., 0]
-    misfit = (off * weighed).sum(axis=1)
-    if np.any(case.reading.angle_deviation):
-        misfit += (turned / case.reading.angle_deviation) ** 2
-    else:
-        np.testing.assert_array_equal(turned, 0.0)
-    np.testing.assert_allclose(found.misfit, misfit, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found.misfit, misfit_of(z, case), rtol=1e-9, atol=1e-9)
     assert set(found.phase) == {TIP, TANGENTIAL}
     assert (z[tip, ARCLENGTH] == 1.0).all()
     assert (z[tip, PSI1] >= -case.delta[tip]).all()
@@ -202,13 +202,7 @@ def test_what_is_told_of_a_contact_is_true_of_it(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_truth_is_never_more_likely(kind):
     case = some_case(2000, seed=8, **KINDS[kind])
-    found = fit(case)
-    turned = case.true[:, 3] - case.reading.drive_angle
-    off = contact_states(case.true, case.delta).loads.T - case.reading.loads - case.reading.leaning * turned[:, None]
-    of_truth = (off * np.linalg.solve(case.reading.covariance, off[..., None])[..., 0]).sum(axis=1)
-    if np.any(case.reading.angle_deviation):
-        of_truth += (turned / case.reading.angle_deviation) ** 2
-    assert (found.misfit <= of_truth * (1.0 + 1e-9) + 1e-9).all()
+    assert (fit(case).misfit <= misfit_of(case.true, case) * (1.0 + 1e-9) + 1e-9).all()
 
 
 @pytest.mark.parametrize("encoder", [False, True])

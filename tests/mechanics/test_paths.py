@@ -105,19 +105,12 @@ def test_snap_off_is_the_first_maximum(family, options):
     index = np.flatnonzero(
         (paths.reach == Reachability.TOUCHES) & (paths.distance > (0.02 if options is LIKELIHOOD else 5e-3))
     )
-    seen_end = _nearest_parameter(sweep_frame, index)
-    ways = np.linspace(0.002, 1.0, 400) ** 2
-    begin = paths.first_parameter[index]
-    parameter = begin[:, None] + (seen_end - begin)[:, None] * ways
-    angle = np.nan_to_num(states_at(paths, index[:, None], parameter).wrench.drive_angle, nan=-9.0)
-    falls = np.diff(angle, axis=1) < -1e-9
-    at = np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)
-    dense = angle[np.arange(index.size), at]
+    dense, before = _first_maximum(paths, index)
     miss = paths.snap_angle[index] - dense
     # A corner between two points of the dense scan is missed by it by up to a step's rise.
-    room = np.abs(angle[np.arange(index.size), np.maximum(at - 1, 0)] - dense) + 1e-3
+    room = np.abs(before - dense) + 1e-3
     # A maximum may be too flat for the dense scan, which then goes on to the next one: it must be one, though.
-    side = 2e-5 * (begin - seen_end)
+    side = 2e-5 * (paths.first_parameter[index] - _nearest_parameter(sweep_frame, index))
     beside = paths.snap_parameter[index] + side * np.array([[1.0], [-1.0]])
     around = states_at(paths, np.broadcast_to(index, beside.shape), beside).wrench.drive_angle
     flat = (miss < 0) & np.all(around < paths.snap_angle[index] + (0 if options is SCAN else 1e-4), axis=0)
@@ -174,6 +167,16 @@ def _nearest_parameter(sweep_frame, index):
     return 0.5 * (lo + hi)
 
 
+def _first_maximum(paths, index):
+    """The drive angle after which exact states of a dense scan fall first, and the one before it."""
+    ways, begin = np.linspace(0.002, 1.0, 400) ** 2, paths.first_parameter[index]
+    parameter = begin[:, None] + (_nearest_parameter(paths.sweep_frame, index) - begin)[:, None] * ways
+    angle = np.nan_to_num(states_at(paths, index[:, None], parameter).wrench.drive_angle, nan=-9.0)
+    falls = np.diff(angle, axis=1) < -1e-9
+    at = np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)
+    return angle[np.arange(index.size), at], angle[np.arange(index.size), np.maximum(at - 1, 0)]
+
+
 @pytest.mark.parametrize("options", [SCAN, LIKELIHOOD], ids=["scan", "likelihood"])
 @pytest.mark.parametrize(
     "beyond", [1e-2, 1e-6, -1e-9, *(pytest.param(b, marks=pytest.mark.slow) for b in (3e-2, 1e-3, 1e-4, 1e-9, -1e-4))]
@@ -190,13 +193,7 @@ def test_tip_and_tangent_touch_at_almost_the_same_time(beyond, options):
     assert keep.sum() > 60
     near = trace(sweep_frame_of(contour), **options)
     assert np.all(near.reach == Reachability.TOUCHES)
-    index = np.arange(near.sweep_frame.size)
-    end = _nearest_parameter(near.sweep_frame, index)
-    ways = np.linspace(0.002, 1.0, 400) ** 2
-    parameter = near.first_parameter[:, None] + (end - near.first_parameter)[:, None] * ways
-    angle = np.nan_to_num(states_at(near, index[:, None], parameter).wrench.drive_angle, nan=-9.0)
-    falls = np.diff(angle, axis=1) < -1e-9
-    dense = angle[index, np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)]
+    dense, _ = _first_maximum(near, np.arange(near.sweep_frame.size))
     assert np.all(np.abs(near.snap_angle - dense) < 1e-2)
 
 

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from helpers.contours_drawn import Scene, scenes
+from helpers.contours_drawn import Scene, edge, mirrored, scenes
 from helpers.exact_path import ExactPath
 from helpers.exact_rod import mp
 from helpers.single_states import states_at
@@ -30,7 +30,6 @@ from tactile_bayes.errors import ContourError
 from tactile_bayes.mechanics.branches.crossings import DIP
 from tactile_bayes.mechanics.elastica import tangential_arclength
 from tactile_bayes.mechanics.phases import NONE
-from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import equilibria, scan
 from tactile_bayes.sweep.path import Acting, sweep_paths
@@ -99,12 +98,10 @@ def check_against_forty_digits(scene):
 
 
 def check_that_it_rises(scene):
-    """From first contact on the drive angle grows all the way to the snap-off, and falls after it.
-
-    Before a join, where the curvature jumps, it may fall by less than is a snap-off, and grow again.
-    At 400 slope angles, the denser the nearer to the snap-off; the contour is asked for its states there, not the path.
-    Rounding of the point that a slope angle stands for is 1e-15 over what a tip's onset makes of it.
-    """
+    """From first contact on the drive angle grows all the way to the snap-off, and falls after it. Before a join, where
+    the curvature jumps, it may fall by less than is a snap-off, and grow again. At 400 slope angles, the denser the
+    nearer to the snap-off; the contour is asked for its states there, not the path. Rounding of the point that a slope
+    angle stands for is 1e-15 over what a tip's onset makes of it."""
     events = scan(scene.contour, base=scene.base, direction=scene.direction).events[scene.direction]
     first, last = events.first_contact.slope_angle, events.snap_off.slope_angle
     slopes = last + (first - last) * np.linspace(0.98, 0.0, 400) ** 2
@@ -123,16 +120,6 @@ def check_that_it_rises(scene):
 def test_down_to_the_snap_off(scene):
     check_against_forty_digits(scene)
     check_that_it_rises(scene)
-
-
-def steep(x, y, left, right, a_left, a_right):
-    """Two parabolas a (x − x_c)² + q that cross at (x, y) with slopes `left` and `right`."""
-
-    def half(a, slope):
-        x_c = x - slope / (2.0 * a)
-        return Parabola(a, y - a * (x - x_c) ** 2, x_c)
-
-    return Joined(half(a_left, left), half(a_right, right), x=x)
 
 
 HARD = {
@@ -168,7 +155,7 @@ HARD = {
     # Rounding undoes the very first contact.
     "steep start": Scene(PowerLaw(4.0, 8.0, 0.2)),
     # Everything happens in a few degrees.
-    "pivot close by": Scene(steep(0.39, 0.1, 0.67, 2.79, 0.62, 0.94), (0.43, 0.126)),
+    "pivot close by": Scene(edge(0.39, 0.1, np.arctan([0.67, 2.79]), (0.62, 0.94)), (0.43, 0.126)),
     "small circle close by": Scene(Circle(0.1, 0.03), (0.02, 0.0)),
     # A tip's onset, in a sweep that ends soon.
     "brief tip contact": Scene(
@@ -202,12 +189,10 @@ def test_hard_cases_down_to_the_snap_off(scene):
 
 
 def shot(scene, angle, parameter, force, rest, tip, friction_angle=0.0):
-    """Loads and contact parameter of the equilibrium at a drive angle.
-
-    The rod is integrated from the contact, where it has no curvature, back to the pivot, which it must hit with the
-    drive's slope: three conditions for three unknowns. In tangential contact it leaves along the contour, after an
-    unknown arc length; in tip contact with an unknown slope, after arc length one.
-    """
+    """Loads and contact parameter of the equilibrium at a drive angle. The rod is integrated from the contact, where it
+    has no curvature, back to the pivot, which it must hit with the drive's slope: three conditions for three unknowns.
+    In tangential contact it leaves along the contour, after an unknown arc length; in tip contact with an unknown
+    slope, after arc length one."""
     side = 1.0 if scene.direction == "forward" else -1.0
 
     def contact(p):
@@ -236,14 +221,14 @@ def shot(scene, angle, parameter, force, rest, tip, friction_angle=0.0):
 
 def shot_at(scene, paths, angle, states, k):
     """Loads by shooting, from some way off; from nearer where the shot hits the other equilibrium, beyond the fold."""
-    w = states.wrench
+    w, delta = states.wrench, paths.sweeps.friction_angle[0]
     tip = w.contact_arclength[k] == 1.0
     force = float(np.hypot(w.force_x[k], w.force_y[k]))
     for off in (0.1, 0.03, 0.01):
         rest = w.tip_angle[k] + 0.1 * off * (w.drive_angle[k] - w.tip_angle[k]) if tip else 1.0 - 0.2 * off
         rest = float(rest if tip else rest * w.contact_arclength[k])
         parameter = states.parameter[k] + off * (states.parameter[k] - paths.snap_parameter[0])
-        loads, found = shot(scene, angle, parameter, (1.0 + 0.2 * off) * force, rest, tip, paths.friction_angle[0])
+        loads, found = shot(scene, angle, parameter, (1.0 + 0.2 * off) * force, rest, tip, delta)
         if found > paths.snap_parameter[0]:
             return loads
     raise AssertionError("no shot hit an equilibrium on the path")
@@ -305,9 +290,7 @@ LETTER = {"tip": "A", "tangential": "B"}
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_sequences_of_phases(sequence, direction):
     """As events, and as the states at slope angles between them have it; a change is where both phases are one state.
-
-    Backward the contour is its mirror image, which only some of the families can give.
-    """
+    Backward the contour is its mirror image, which only some of the families can give."""
     contour = SEQUENCES[sequence].contour
     if direction == "backward" and sequence in ("B-A", "B-A-B", "A-B-A-B-A"):
         contour = mirrored(contour)
@@ -330,28 +313,24 @@ def test_sequences_of_phases(sequence, direction):
         assert (b.drive_angle > a.drive_angle) == (direction == "forward")
 
 
-def mirrored(contour):
-    """The image of a contour in the y axis, for those that need one here."""
-    if isinstance(contour, Joined):
-        return Joined(contour.right, contour.left)
-    return ShapeFree(-contour.slope_angles[::-1], contour.log_radius[::-1], -contour.x, contour.y)
-
-
 # --- the first maximum -----------------------------------------------------------------------------------------------
 
 
 def test_profile_four_lets_go_at_its_vertex_without_moment():
-    """α = 0, φ0 = π and m0 = 0 at once, by symmetry of the half wave between pivot and contact."""
+    """α = 0, φ0 = π and m0 = 0 at once, by symmetry of the half wave between pivot and contact: by thrust."""
     scene = Scene(paper_profile("IV", 0.3))
-    last = scan(scene.contour, direction="forward").events["forward"].snap_off
+    sweep = scan(scene.contour, direction="forward").events["forward"]
+    last = sweep.snap_off
+    assert (sweep.first_contact.kind, sweep.transitions, last.kind) == ("tangential", (), "thrust")
     assert abs(last.slope_angle) < 1e-13
+    assert (last.contact_x, last.contact_y) == (pytest.approx(0.0, abs=1e-13), pytest.approx(0.3, abs=1e-15))
     assert abs(last.drive_angle - np.pi) < SNAP_OFF
     assert abs(last.holding_moment) < 1e-12
     check_against_forty_digits(scene)
 
 
 TWO_MAXIMA = {
-    "edge": Scene(steep(0.08, 0.445, 0.847, 2.186, 0.625, 3.79), (-0.075, -0.494)),
+    "edge": Scene(edge(0.08, 0.445, np.arctan([0.847, 2.186]), (0.625, 3.79)), (-0.075, -0.494)),
     "sharp vertex": Scene(PowerLaw(0.147, 1.35, 0.218, -0.143), (0.2815, -0.3946), "backward"),
     "flat vertex": Scene(PowerLaw(16.5, 3.0, 0.742, -0.18), (0.0, 0.0), "backward"),
 }
@@ -380,13 +359,3 @@ def test_of_two_maxima_the_first_ends_the_sweep(scene):
     assert after[0] < end
     assert np.nanmax(after) > end + 5e-3
     check_against_forty_digits(scene)
-
-
-def test_the_kinds_of_ends():
-    """A fold and a corner, each told by its name."""
-    ends = {"fold": Scene(paper_profile("II", 0.3)), "corner": Scene(paper_profile("II", 0.5))}
-    for kind, scene in ends.items():
-        paths = scene.paths()
-        exact = ExactPath(*scene)
-        found, _ = exact.snap_off(exact.start(states_along(paths, paths.snap_parameter[0])))
-        assert found == kind == SnapOff(int(paths.snap_off[0])).name.lower()

@@ -48,13 +48,21 @@ def lowest(contour, slope_angles, base=(0.0, 0.0)):
     return np.array([eigenvalues(held(contour, states.isel(slope_angle=k)))[:2] for k in range(len(slope_angles))])
 
 
+def assert_zero_is_crossed(eigenvalue, last, near=1e-3):
+    """Where the lowest eigenvalue crosses zero is known to its error over its slope, and the snap-off is there."""
+    before, after = eigenvalue(last.slope_angle + near), eigenvalue(last.slope_angle - near)
+    assert before > 1e3 * EIGENVALUE
+    assert after < -1e3 * EIGENVALUE
+    crossing = brentq(eigenvalue, last.slope_angle - near, last.slope_angle + near, xtol=1e-14)
+    assert abs(crossing - last.slope_angle) < EIGENVALUE / ((before - after) / (2 * near))
+    return crossing
+
+
 @pytest.mark.parametrize("terms", [20, 40, 60])
 def test_a_free_rod_has_its_textbook_spectrum(terms):
-    """Without force Q is ∫ η'², with a clamped and a free end: ((k + 1/2) π)², less the one that N takes away.
-
-    In tip contact of a straight rod that stands on the contour (ψ = π/2) N vanishes identically but for the rounding of
-    π/2; with ψ = 0 it is ∫ η, and the spectrum is that of tan z = z: z = 4.4934…, 7.7252….
-    """
+    """Without force Q is ∫ η'², with a clamped and a free end: ((k + 1/2) π)², less the one that N takes away. In tip
+    contact of a straight rod that stands on the contour (ψ = π/2) N vanishes identically but for the rounding of π/2;
+    with ψ = 0 it is ∫ η, and the spectrum is that of tan z = z: z = 4.4934…, 7.7252…."""
     rod = Held(0.3, 0.0, 0.0, 0.3, 1.0, 1.0, True)
     roots = [brentq(lambda z: np.sin(z) - z * np.cos(z), k * np.pi, (k + 0.5) * np.pi) for k in (1, 2)]
     np.testing.assert_allclose(eigenvalues(rod, terms)[:2], np.square(roots), rtol=1e-10)
@@ -87,25 +95,15 @@ FOLDS = {
     ],
 )
 def test_at_a_smooth_fold_the_lowest_eigenvalue_crosses_zero(contour, base, phase):
-    """Where it does is known to its error over its slope, and the snap-off as given is there."""
     first, last = snap_off(contour, base)
     assert last.kind == "fold"
-    near = 1e-3
-
-    def eigenvalue(alpha):
-        return lowest(contour, [alpha], base)[0, 0]
-
-    before, after = eigenvalue(last.slope_angle + near), eigenvalue(last.slope_angle - near)
-    assert before > 1e3 * EIGENVALUE
-    assert after < -1e3 * EIGENVALUE
-    crossing = brentq(eigenvalue, last.slope_angle - near, last.slope_angle + near, xtol=1e-14)
-    assert abs(crossing - last.slope_angle) < EIGENVALUE / ((before - after) / (2 * near))
+    crossing = assert_zero_is_crossed(lambda alpha: lowest(contour, [alpha], base)[0, 0], last)
     assert str(equilibria(contour, [crossing], base=base).contact_phase.values[0]) == phase
 
     # Stable all the way from first contact; and at the snap-off one mode only is lost.
     way = last.slope_angle + (first.slope_angle - last.slope_angle) * np.linspace(0.02, 0.9, 8)
     assert np.all(lowest(contour, way, base)[:, 0] > 1e3 * EIGENVALUE)
-    around = lowest(contour, last.slope_angle + near * np.linspace(-1, 1, 5), base)
+    around = lowest(contour, last.slope_angle + 1e-3 * np.linspace(-1, 1, 5), base)
     assert np.all(around[:, 1] > FAR)
 
 
@@ -135,11 +133,9 @@ def test_at_a_corner_the_lowest_eigenvalue_jumps_below_zero(contour, base, befor
 @pytest.mark.slow
 def test_at_the_vertex_of_profile_four():
     """It falls to zero like the distance x from the vertex, where the radius 1/(12 x²) grows beyond all bounds: there
-    the form is that of a rod which cannot turn at its contact, with a half wave from pivot to contact.
-
-    λ = c x + O(x²), so that 2 λ(x/2) − λ(x) is O(x²): eight times less whenever x is halved would be O(x³), four times
-    O(x²). Beyond, the radius is one and the contact turns freely: the eigenvalue jumps below zero.
-    """
+    the form is that of a rod which cannot turn at its contact, with a half wave from pivot to contact. λ = c x + O(x²),
+    so that 2 λ(x/2) − λ(x) is O(x²): eight times less whenever x is halved would be O(x³), four times O(x²). Beyond,
+    the radius is one and the contact turns freely: the eigenvalue jumps below zero."""
     contour = paper_profile("IV", 0.3)
     _, last = snap_off(contour, (0.0, 0.0))
     assert last.slope_angle == pytest.approx(0.0, abs=1e-12)
@@ -189,14 +185,10 @@ def test_curved_and_tapered_rods_are_stable_up_to_their_snap_off(name, q):
     way = [of_state(record.isel(sample=k)) for k in loaded[1 : -1 : max(1, loaded.size // 10)]]
     assert np.min(way) > 1e3 * EIGENVALUE
 
-    near = 1e-3
-    before, after = eigenvalue(last.slope_angle + near), eigenvalue(last.slope_angle - near)
-    assert before > 1e3 * EIGENVALUE
-    assert after < -1e3 * EIGENVALUE
-    if last.kind == "fold":  # else it jumps where the phase changes
-        crossing = brentq(eigenvalue, last.slope_angle - near, last.slope_angle + near, xtol=1e-14)
-        assert abs(crossing - last.slope_angle) < EIGENVALUE / ((before - after) / (2 * near))
+    if last.kind == "fold":
+        assert_zero_is_crossed(eigenvalue, last)
     else:
-        assert last.kind == "corner"
-        assert eigenvalue(last.slope_angle + 1e-9) > 1e3 * EIGENVALUE
-        assert eigenvalue(last.slope_angle - 1e-9) < -1e3 * EIGENVALUE
+        assert last.kind == "corner"  # it jumps where the phase changes
+        for near in (1e-3, 1e-9):
+            assert eigenvalue(last.slope_angle + near) > 1e3 * EIGENVALUE
+            assert eigenvalue(last.slope_angle - near) < -1e3 * EIGENVALUE

@@ -20,10 +20,8 @@ from tactile_bayes.runs.readings import reconstruction_messages
 
 @pytest.mark.parametrize(("family", "count"), [("parabola", 20), pytest.param("ellipse", 250, marks=pytest.mark.slow)])
 def test_biases_do_not_turn_a_side(family, count):
-    """A doubt of two standard errors comes up in one of 44 sweeps at most, a wrong side never: it takes six.
-
-    Of records of the default prior, biases having three times its standard deviation.
-    """
+    """A doubt of two standard errors comes up in one of 44 sweeps at most, a wrong side never: it takes six. Of records
+    of the default prior, biases having three times its standard deviation."""
     unknown = {"lever": 0.0, "backlash": 0.0, "friction": 0.0, "bias": stats.norm(0.0, 0.3)}
     experiment = experiment_of(family, Rig(load_cell=CELL, unknown=unknown), rng=1)
     doubtful = 0

@@ -185,14 +185,6 @@ def test_phase_changes_and_first_contact_by_bisection(name, q, base):
             assert seen(change, side) == pytest.approx(truth.drive_angle, abs=1e-10)
 
 
-def test_profile_four_lets_go_at_its_vertex():
-    """By thrust, and a fold it is, too: the rate of the drive angle vanishes with the moment."""
-    sweep = scan(paper_profile("IV", 0.3), direction="forward").events["forward"]
-    assert kinds(sweep) == ["tangential", "thrust"]
-    last = sweep.snap_off
-    assert (last.contact_x, last.contact_y) == (pytest.approx(0.0, abs=1e-13), pytest.approx(0.3, abs=1e-15))
-
-
 @pytest.mark.parametrize("base", [(0.0, 0.0), (0.15, -0.05)])
 @pytest.mark.parametrize("contour", [paper_profile("II", 0.5), paper_profile("IV", 0.3), Circle(0.2, 0.35)])
 def test_the_record(contour, base):

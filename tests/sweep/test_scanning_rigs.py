@@ -4,8 +4,8 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
+from helpers.integration import rod
 from helpers.refusals import refused
 from tactile_bayes import Rig, Rod, scan
 from tactile_bayes.contours import (
@@ -112,17 +112,10 @@ def test_the_largest_strain_against_integration(direction, q):
         result = scan(contour, direction=direction, rig=Rig(rod=WIRE), drive_step=np.radians(0.5))
     record, greatest = result.record, 0.0
     for i in np.flatnonzero(record.truth_contact_phase.values != "none"):
-        moment, fx, fy, angle, length = (
-            float(record[name][i]) for name in (*CHANNELS, "drive_angle", "truth_contact_arclength")
-        )
-
-        def bend(_, state, fx=fx, fy=fy):
-            return [state[1], (fy * np.cos(state[0]) - fx * np.sin(state[0])) / WIRE.flexural_rigidity]
-
-        rod = solve_ivp(
-            bend, (0.0, length), [angle, -moment / WIRE.flexural_rigidity], rtol=1e-9, max_step=length / 100
-        )
-        greatest = max(greatest, float(np.abs(rod.y[1]).max()))
+        angle, length = (float(record[name][i]) for name in ("drive_angle", "truth_contact_arclength"))
+        loads = [float(record[name][i]) / WIRE.flexural_rigidity for name in CHANNELS]
+        along = rod([angle, *loads], length, max_step=length / 100)
+        greatest = max(greatest, float(np.abs(along.y[3]).max()))
     strain = result.sweeps[0].largest_strain
     # On the grid of half a degree the greatest is a little less than on the whole path, which is sampled, too.
     assert greatest * 0.5 * WIRE.diameter * (1 - 1e-4) <= strain <= 1.05 * greatest * 0.5 * WIRE.diameter

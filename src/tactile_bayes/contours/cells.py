@@ -20,10 +20,8 @@ _MOST = 256
 
 
 def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:
-    """Tables of contours with parameters of shape (n,), between two parameters, each of shape (n,).
-
-    Cells end at knots and are halved until series of 16 terms are exact to 4e-15, relative in points, in slope in rad.
-    """
+    """Tables of contours with parameters of shape (n,), between two parameters, each of shape (n,). Cells end at knots
+    and are halved until series of 16 terms are exact to 4e-15, relative in points, in slope in rad."""
     count = low.size
     knots = np.array([np.broadcast_to(knot, (count,)) for knot in contour.knots], dtype=float).reshape(-1, count)
     edges = np.sort(np.vstack([low, np.clip(knots, low, high), high]), axis=0)

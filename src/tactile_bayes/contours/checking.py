@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours.base import Contour, Graph, Locus
-from tactile_bayes.contours.rates import Rate, mismatch, probes
 from tactile_bayes.errors import ContourError
 
 BatchIndex = tuple[int, ...]
+Rate = Callable[[Floats], Floats]
 
 # Number of points at which rates are checked, and the stride of the points at which searches are checked.
 _PROBES, _FEW = 400, 10
@@ -23,6 +23,14 @@ _STEEPEST = 1.5  # largest slope angle at which a contour is checked [rad]
 _NEAREST, _ENDLESS = 1e-9, 62.0
 _STRAIGHT = 5  # number of neighbouring points without curvature that make a contour straight; rounding may cause fewer
 _HALVINGS = 60  # by which the place where a contour is too steep is found
+_MISS = 1e-6  # tolerated error of an integral, as a share of the largest change between neighbouring stops
+_ROUNDING = 16.0 * np.finfo(float).eps
+_SUSPECTS = 16  # number of the worst stretches that are examined
+_RATE_HALVINGS = 8
+# If the derivative is right, the misses of a stretch shrink at least by this factor after so many halvings: only those
+# about a jump or a kink remain. The misses of a wrong derivative keep their sum.
+_SHRINKS = 0.25
+_JUMP = 1e-6  # tolerated change of a rate over a distance of rounding, as a share of the largest rate
 _SAME = 1e-9  # rounding error, as a share of a contour's size, or as an angle [rad]
 
 
@@ -241,3 +249,63 @@ def _of(index: Sequence[int]) -> tuple[Any, ...]:
 
 def _text(x: float) -> str:
     return f"{0.0 if abs(x) < 1e-12 else float(x):.6g}"
+
+
+class Mismatch(NamedTuple):
+    """A stretch over which a function is not the integral of another."""
+
+    left: float
+    right: float
+    miss: float  # difference over the stretch; NaN if the derivative only jumps, at `right`
+    contour: tuple[int, ...]  # index of the function among many
+
+
+def probes(count: int) -> Floats:
+    """Return points in (−1, 1), dense toward the ends. They are shifted a little to the left, so that zero, a likely
+    position of a jump, is neither one of them nor in the middle between two, where no integral would miss it."""
+    return -np.cos(np.pi * (np.arange(count) + 0.38) / count)
+
+
+def mismatch(rate: Rate, of: Rate, stops: Floats) -> Mismatch | None:
+    """Find the worst stretch between stops, (n, ...), over which a function's change is not the integral of its rate. A
+    rate may jump at stops only; a jump elsewhere is returned if there is nothing worse."""
+    change, miss = _misses(rate, of, stops)
+    excess = miss - _MISS * np.abs(change).max(axis=0) - _ROUNDING * np.abs(of(stops)).max(axis=0)
+    jump = None
+    for place in np.argsort(excess, axis=None)[::-1][:_SUSPECTS]:
+        stretch, *index = (int(i) for i in np.unravel_index(place, excess.shape))
+        at = (stretch, *index)
+        if excess[at] <= 0.0:
+            break
+        ends = stops[stretch], stops[stretch + 1]
+        _, finer = _misses(rate, of, np.linspace(*ends, 2**_RATE_HALVINGS + 1))
+        if finer.sum(axis=0)[tuple(index)] > _SHRINKS * miss[at]:
+            return Mismatch(float(stops[at]), float(stops[stretch + 1, *index]), float(miss[at]), tuple(index))
+        left, right, size = (v[tuple(index)] for v in _steepest(rate, *ends))
+        begin, end = (stop[tuple(index)] for stop in ends)
+        inside = begin < left and right < end  # at a stop it may jump, or rise as steeply as a power of almost zero
+        if jump is None and inside and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(index)]:
+            jump = Mismatch(float(left), float(right), np.nan, tuple(index))
+    return jump
+
+
+def _misses(rate: Rate, of: Rate, stops: Floats) -> tuple[Floats, Floats]:
+    """Changes between neighbouring stops, and the errors of the integrals, by eight Gauss–Legendre nodes."""
+    node, weight = np.polynomial.legendre.leggauss(8)
+    half, middle = 0.5 * np.diff(stops, axis=0), 0.5 * (stops[:-1] + stops[1:])
+    inside = middle[:, None] + half[:, None] * node.reshape(-1, *(1,) * (stops.ndim - 1))
+    rates = rate(inside.reshape(-1, *stops.shape[1:])).reshape(inside.shape)
+    change = np.diff(of(stops), axis=0)
+    return change, np.abs(np.tensordot(weight, rates, axes=(0, 1)) * half - change)
+
+
+def _steepest(rate: Rate, left: NDArray[np.floating], right: NDArray[np.floating]) -> tuple[Floats, Floats, Floats]:
+    """Neighbouring points between which a rate changes most, and the change, by bisection."""
+    a, b = rate(np.stack([left, right]))
+    for _ in range(60):
+        middle = 0.5 * (left + right)
+        (m,) = rate(middle[None])
+        first = np.abs(m - a) >= np.abs(b - m)
+        left, a = np.where(first, left, middle), np.where(first, a, m)
+        right, b = np.where(first, middle, right), np.where(first, m, b)
+    return np.asarray(left), np.asarray(right), np.abs(b - a)

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers
 from tactile_bayes.contours.base import Graph, Single
-from tactile_bayes.contours.checking import check_shape
+from tactile_bayes.contours.checking import check_shape, probes
 from tactile_bayes.contours.joined import SAME_SLOPE
-from tactile_bayes.contours.rates import probes
 from tactile_bayes.errors import ContourError, ParameterError
 
 Function = Callable[[Floats], ArrayLike]

@@ -28,10 +28,8 @@ class Directions(NamedTuple):
 
 @dataclass(frozen=True)
 class RandomRadius:
-    """Random radius log ρ(α) = log r + amplitude · g(α), with a Gaussian process g and the geometric mean r of ρ.
-
-    The covariance of g is Matérn's with ν = 5/2 (Rasmussen & Williams 2006, equation 4.17), less the mean over slopes.
-    """
+    """Random radius log ρ(α) = log r + amplitude · g(α), with a Gaussian process g and the geometric mean r of ρ. The
+    covariance of g is Matérn's with ν = 5/2 (Rasmussen & Williams 2006, equation 4.17), less the mean over slopes."""
 
     shortest: float  # range of the length scale [rad]
     longest: float

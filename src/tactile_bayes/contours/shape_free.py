@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours.base import Locus, Parameter
-from tactile_bayes.contours.tabled import Tabled
+from tactile_bayes.contours.base import Locus, Parameter, Tabled
 from tactile_bayes.errors import ContourError
 from tactile_bayes.numerics import chebyshev
 
@@ -121,6 +120,3 @@ class ShapeFree(Tabled):
         log_radius, x, y = self._evaluate(alpha)
         alpha = np.broadcast_to(alpha, x.shape)
         return Locus(x, y, alpha, np.exp(log_radius), np.ones_like(alpha))
-
-    def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        return self._own("slope_angle", slope_angle)

@@ -88,12 +88,10 @@ class ShapeFreeFamily(ContourFamily):
         return Smooth(log_radius, q, x_c, *([np.exp(flat[0]), flat[1]] if flat else []))
 
     def contour(self, values: Mapping[str, Any]) -> Contour:
-        r, amplitude, length = (np.asarray(values[name]) for name in ("r", "amplitude", "length_scale"))
-        refuse_unless((r > 0.0) & np.isfinite(r), self.name, "r must be positive and finite", r=r)
-        if self.has_flat:
-            flat = np.asarray(values["flat_length"])
-            rule = "flat_length must be positive and finite"
-            refuse_unless((flat > 0.0) & np.isfinite(flat), self.name, rule, flat_length=flat)
+        amplitude, length = (np.asarray(values[name]) for name in ("amplitude", "length_scale"))
+        for name in ("r", "flat_length") if self.has_flat else ("r",):
+            size, rule = np.asarray(values[name]), f"{name} must be positive and finite"
+            refuse_unless((size > 0.0) & np.isfinite(size), self.name, rule, **{name: size})
         rule = "amplitude must be finite and not negative"
         refuse_unless((amplitude >= 0.0) & np.isfinite(amplitude), self.name, rule, amplitude=amplitude)
         low, high = self.bounds["length_scale"]
@@ -103,9 +101,7 @@ class ShapeFreeFamily(ContourFamily):
 
     def fit(self, x: Floats, y: Floats) -> dict[str, float]:
         """Fit by distances along the normal and the prior of the directions, from a circle with the points' curvature.
-
-        Of very many points an even selection is used.
-        """
+        Of very many points an even selection is used."""
         picked = evenly_spread(x.size, _POINTS)
         x, y = x[picked], y[picked]
         a, q, x_c = parabola_through(x, y)

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_whole_number
-from tactile_bayes.contours.base import Locus, Parameter
+from tactile_bayes.contours.base import Locus, Parameter, Tabled
 from tactile_bayes.contours.halves import SLOPES, Half, Halves
-from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
 from tactile_bayes.numerics import chebyshev
 from tactile_bayes.numerics.roots import falling_root
@@ -105,9 +104,6 @@ class Smooth(Tabled):
         speed = (x_rate * np.cos(alpha) + y_rate * np.sin(alpha)) * (cells / (2.0 * _UPRIGHT))
         return Locus(self.x_c + x, self.q + y, alpha, speed, np.ones_like(alpha))
 
-    def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        return self._own("slope_angle", slope_angle)
-
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         x = self._at("x", x)
         shape = np.broadcast_shapes(self.shape, x.shape)
@@ -135,10 +131,8 @@ class Smooth(Tabled):
 
 
 def _tabulated(coefficients: Floats, flat_length: Floats, flat_slope: Floats) -> Floats:
-    """Table at the ends of cells, (n, cells + 1, 6), as in `Halves`, from coefficients of log ρ, (k, n).
-
-    The integral over a cell has an error of seventh order in its width.
-    """
+    """Table at the ends of cells, (n, cells + 1, 6), as in `Halves`, from coefficients of log ρ, (k, n). The integral
+    over a cell has an error of seventh order in its width."""
     cells = _CELLS_OF_FLAT if np.any(flat_length) else _CELLS
     alpha, values, slopes = _grid(coefficients.shape[0], cells)
     log_radius = coefficients.T @ values

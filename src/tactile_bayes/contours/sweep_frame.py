@@ -14,11 +14,9 @@ _FAR = 1e3  # rod lengths beyond which an end of a contour does not matter
 
 @dataclass(frozen=True)
 class SweepFrame:
-    """A batch of n contours of one family, each in the frame of a sweep with its own pivot.
-
-    The rod's centreline traces the parallel curve at `standoff`, half the rod's diameter. In this frame all sweeps are
-    forward ones. Lengths are in the contour's unit, and what is not an array of shape (n,) holds for all contours.
-    """
+    """A batch of n contours of one family, each in the frame of a sweep with its own pivot. The rod's centreline traces
+    the parallel curve at `standoff`, half the rod's diameter. In this frame all sweeps are forward ones. Lengths are in
+    the contour's unit, and what is not an array of shape (n,) holds for all contours."""
 
     contour: Contour  # contours whose parameters are all arrays of shape (n,)
     base_x: Floats  # pivots

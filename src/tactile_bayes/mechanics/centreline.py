@@ -24,41 +24,10 @@ def rod_shape(
 ) -> tuple[Floats, Floats]:
     """Centreline of the rod from pivot to tip: x' = cos φ, y' = sin φ, φ'' = f cos(φ − β) (equation 27).
 
-    Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form.
-
-    Parameters
-    ----------
-    drive_angle, holding_moment, force_x, force_y : array_like
-        Slope of the rod at the pivot [rad] and the wrench there (moment EI/L, force EI/L²); they broadcast.
-    points : int
-        Number of points of the rod, at arc lengths `numpy.linspace(0, 1, points)`; at least 2. Give more if rods look
-        polygonal.
-    side : array_like of +1 or −1, optional
-        +1 for contacts of a forward sweep, −1 for those of a backward one; by default the sign of the holding moment.
-    rest_curvature : array_like
-        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
-    rods : Rods, optional
-        Rods in place of arcs, mirrored to those of forward contacts.
-
-    Returns
-    -------
-    x, y : ndarray, shape (..., points), or one more if there is a stem
-        Coordinates relative to the pivot [L], of which the first is the pivot. Where the force is zero or the wrench
-        NaN, the rod is not loaded and has its rest shape. Where the bending moment has no zero, no contact makes such a
-        wrench, and the coordinates are NaN.
-
-    Raises
-    ------
-    ParameterError
-        If there are fewer than 2 points.
-
-    Examples
-    --------
-    >>> from tactile_bayes.mechanics.elastica import wrench_from_contact
-    >>> w = wrench_from_contact(0.2, 0.6, 0.1)
-    >>> x, y = rod_shape(w.drive_angle, w.holding_moment, w.force_x, w.force_y, points=5)
-    >>> x.round(3), y.round(3)
-    (array([ 0.   , -0.203, -0.221, -0.042,  0.2  ]), array([0.   , 0.135, 0.375, 0.541, 0.6  ]))
+    Merker et al. 2018, doi 10.1155/2018/1613945, in closed form. The wrench is as in `contact_from_wrench`, and so is
+    the side; `rods`, mirrored to those of forward contacts, may take the place of arcs. Returns x and y [L] from the
+    pivot, shape (..., points), or one more if there is a stem. Where the force is zero or the wrench NaN, the rod has
+    its rest shape; where no contact makes such a wrench, it is NaN.
     """
     from tactile_bayes.mechanics.contacts.states import write_shapes
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load

@@ -54,24 +54,10 @@ def base_curvature(
 ) -> Floats:
     """Curvature κ0 = M0/(EI) at the base of a clamped rod that a thin probe pushes to a point.
 
-    Parameters
-    ----------
-    along, across : array_like
-        The point in the frame of the clamp: along the direction of the clamp, and to its left [mm, or another unit of
-        length]; they broadcast.
-    compliance : array_like
-        Turn of the suspension per base curvature, c = EI · angle per moment [the same unit of length].
-    small_deflection : bool
-        Take the linear beam instead of the large-deflection rod.
+    In the frame of the clamp the point lies along its direction and across it, to the left, in any unit of length. The
+    compliance c is the turn of the suspension per base curvature [the same unit]; a small deflection is that of the
+    linear beam. NaN where there is no stable equilibrium, or the angle between chord and base exceeds 1.5 rad.
 
-    Returns
-    -------
-    ndarray
-        Base curvature [1 over that unit], of the broadcast shape; positive where the rod is bent to the left, NaN where
-        there is no stable equilibrium or the angle between chord and base exceeds 1.5 rad.
-
-    Examples
-    --------
     The tip of a beam of length 40 is pushed aside by 0.4 and by 20; the linear beam has 3 w / a²:
 
     >>> base_curvature(40.0, [0.4, 20.0]).round(6)

@@ -34,18 +34,14 @@ if _KNOWN[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= _KNOWN[1]:
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function as a part of its callers; Python cannot call it.
-
-    For a literal True, False or number in a call all is compiled once more: bool(1) is none.
-    """
+    """Compile a function as a part of its callers; Python cannot call it. For a literal True, False or number in a call
+    all is compiled once more: bool(1) is none."""
     return _part(function)
 
 
 def inlined(function: Function) -> Function:
-    """Compile a function as `compiled` does, and put its code in place of each call.
-
-    A call copies all fields of its arguments. For small functions of many fields that takes longer than they do.
-    """
+    """Compile a function as `compiled` does, and put its code in place of each call. A call copies all fields of its
+    arguments. For small functions of many fields that takes longer than they do."""
     return _part(function, forceinline=True)
 
 
@@ -56,11 +52,9 @@ def _part(function: Function, **more: bool) -> Function:
 
 
 def cached(function: Function) -> Function:
-    """Compile a function and cache its machine code on disk for the next process, where that is possible.
-
-    numba notices a change of the function's own file, but not of the files of the functions that it calls. Therefore a
-    hash of all files is a part of its name.
-    """
+    """Compile a function and cache its machine code on disk for the next process, where that is possible. numba notices
+    a change of the function's own file, but not of the files of the functions that it calls. Therefore a hash of all
+    files is a part of its name."""
     function.__qualname__ += f"_{_version()}"
     try:
         made: Function = numba.njit(function, cache=True, **_OPTIONS)

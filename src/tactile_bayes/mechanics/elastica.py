@@ -9,7 +9,7 @@ others are found by continuation (`continuation`), and contacts of rods with a p
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_arrays, check_kind, check_number, check_optional
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.phases import NONE
-from tactile_bayes.mechanics.rods.profile import Profile, Rods
+from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = [
     "MAX_FRICTION_ANGLE",
@@ -137,7 +137,7 @@ def tangential_arclength(
         rest_curvature=rest_curvature,
     )
     with np.errstate(over="ignore", invalid="ignore"):
-        return _states(x, y, alpha, delta, bent, NONE)[1][8]
+        return _states((x, y, alpha, delta, bent, NONE))[1][8]
 
 
 def wrench_from_contact(
@@ -212,9 +212,9 @@ def wrench_from_contact(
     sign = np.where(sides < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
     bent = sign * (curvature if profile is None else profile.sign)
-    contacts: tuple[Any, ...] = sign * x, y, sign * alpha, delta, bent, known, profile
+    contacts = sign * x, y, sign * alpha, delta, bent, known
     with np.errstate(over="ignore", invalid="ignore"):  # of contacts out of reach
-        found, columns = _states(*contacts) if stem == 0.0 else _states_on_stem(stem, *contacts)
+        found, columns = _states(contacts, profile) if stem == 0.0 else _states_on_stem(stem, contacts, profile)
     drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
     return Wrench(
         drive_angle=np.where(mirrored, np.pi - drive_angle, drive_angle),
@@ -236,28 +236,19 @@ def lever_of_stem(stem: float, drive_angle: Floats, force_x: Floats, force_y: Fl
 
 
 def _states_on_stem(
-    stem: float,
-    x: ArrayLike,
-    y: ArrayLike,
-    alpha: ArrayLike,
-    delta: ArrayLike,
-    bent: ArrayLike,
-    phase: ArrayLike,
-    profile: Profile | None,
+    stem: float, contacts: tuple[ArrayLike, ...], profile: Profile | None
 ) -> tuple[NDArray[np.int8], Floats]:
-    """`_states` of rods that begin at the end of a stem.
-
-    A drive angle a puts the beginning of the rod somewhere, from where the contact takes the drive angle φ0(a). Sought
-    is the a with φ0(a) = a: the farther the stem is turned, the less the rod.
-    """
-    given = np.broadcast_arrays(x, y, alpha, delta, bent, phase)
+    """`_states` of rods that begin at the end of a stem. A drive angle a puts the beginning of the rod somewhere, from
+    where the contact takes the drive angle φ0(a). Sought is the a with φ0(a) = a: the farther the stem is turned, the
+    less the rod."""
+    given = np.broadcast_arrays(*contacts)
     shape = given[0].shape
-    x, y, alpha, delta, bent, phase = (np.asarray(column.ravel()) for column in given)
+    x, y, *others = (np.asarray(column.ravel()) for column in given)
     bearing = np.arctan2(y, x)
     low, high, angle = bearing - _FARTHEST, bearing + _FARTHEST, bearing
     for _ in range(_MOST_HALVINGS):
         from_x, from_y = x - stem * np.cos(angle), y - stem * np.sin(angle)
-        found, columns = _states(from_x, from_y, alpha, delta, bent, phase, profile)
+        found, columns = _states((from_x, from_y, *others), profile)
         # Out of reach the stem is turned too far, to either side.
         off = np.where(np.isfinite(columns[0]), columns[0] - angle, np.where(angle < bearing, 1.0, -1.0))
         if not np.any((np.abs(off) > _SETTLED) & (high - low > _SETTLED)):
@@ -285,25 +276,15 @@ def _turned_by_stem(stem: float, angle: Floats, x: Floats, y: Floats, columns: F
     return np.asarray(columns[7] * nearer + (1.0 - columns[6]) * turned)
 
 
-def _states(
-    x: ArrayLike,
-    y: ArrayLike,
-    alpha: ArrayLike,
-    delta: ArrayLike,
-    bent: ArrayLike,
-    phase: ArrayLike,
-    profile: Profile | None = None,
-) -> tuple[NDArray[np.int8], Floats]:
-    """Phases, and columns of states, shape (9, ...), of contacts mirrored to forward ones.
-
-    `bent` is the rest curvature [1/L] of arcs, mirrored with them; of rods with a profile, the sign that mirrors it.
-    """
+def _states(contacts: tuple[ArrayLike, ...], profile: Profile | None = None) -> tuple[NDArray[np.int8], Floats]:
+    """Phases, and columns of states, shape (9, ...), of contacts mirrored to forward ones. `bent` is the rest curvature
+    [1/L] of arcs, mirrored with them; of rods with a profile, the sign that mirrors it."""
     from tactile_bayes.mechanics.contacts.tables import tables, workspace
     from tactile_bayes.mechanics.contacts.wrenches import continued_wrenches, wrenches
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
-    _refuse_friction(np.asarray(delta, dtype=float), 0.0 if profile is None else -MAX_FRICTION_ANGLE)
-    given = np.broadcast_arrays(x, y, alpha, delta, bent, phase)
+    _refuse_friction(np.asarray(contacts[3], dtype=float), 0.0 if profile is None else -MAX_FRICTION_ANGLE)
+    given = np.broadcast_arrays(*contacts)
     shape = given[0].shape
     columns = np.stack([column.ravel() for column in given[:5]], axis=-1).astype(float)
     found, out = given[5].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
@@ -375,6 +356,9 @@ def contact_from_wrench(
     >>> c.contact_x.round(12), c.contact_y.round(12), c.slope_angle.round(12)
     (np.float64(0.2), np.float64(0.6), np.float64(0.1))
     """
+    from tactile_bayes.mechanics.contacts.states import write_contacts
+    from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
+
     angle, moment, fx, fy, delta, curvature, sides = check_arrays(
         drive_angle=drive_angle,
         holding_moment=holding_moment,
@@ -393,37 +377,13 @@ def contact_from_wrench(
     of_rods = sign * curvature if profile is None else sign
     given = np.broadcast_arrays(phi0, sign * moment, sign * fx, fy, delta, of_rods)
     *wrench, of_rods = (column.ravel() for column in given)
-    rods = Rods(of_rods.astype(float), profile, stem)
+    found = np.empty((wrench[0].size, 6))
     with np.errstate(over="ignore", invalid="ignore"):
-        found = forward_contacts(np.stack(wrench, axis=-1).astype(float), rods)
-    x, y, slope_angle, arclength, tip_angle, modulus = found.reshape(6, *given[0].shape)
+        columns = np.ascontiguousarray(np.stack(wrench, axis=-1).astype(float))
+        write_contacts(columns, of_rods.astype(float), varied_of(profile), stem, found, np.empty((0, 2, 2)))
+    x, y, slope_angle, arclength, tip_angle, modulus = np.ascontiguousarray(found.T).reshape(6, *given[0].shape)
     tip_angle = np.where(mirrored, np.pi - tip_angle, tip_angle)
     return Contact(sign * x, y, sign * slope_angle, arclength, tip_angle, modulus)
-
-
-def forward_contacts(wrenches: Floats, rods: Rods) -> Floats:
-    """Contacts that follow from base wrenches, mirrored to forward ones.
-
-    Parameters
-    ----------
-    wrenches : ndarray, shape (n, 5)
-        Drive angle, holding moment and support reaction, friction angle.
-    rods : Rods
-        n rods, mirrored with the wrenches.
-
-    Returns
-    -------
-    ndarray, shape (6, n)
-        As `Contact`.
-    """
-    from tactile_bayes.mechanics.contacts.states import write_contacts
-    from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
-
-    out = np.empty((len(wrenches), 6))
-    write_contacts(
-        np.ascontiguousarray(wrenches), rods.curvature, varied_of(rods.profile), rods.stem, out, np.empty((0, 2, 2))
-    )
-    return np.ascontiguousarray(out.T)
 
 
 def largest_curvature(wrench: Wrench, rest_curvature: ArrayLike = 0.0) -> Floats:

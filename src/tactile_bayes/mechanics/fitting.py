@@ -36,9 +36,7 @@ _SAME = 1e-4  # difference of coordinates of one and the same optimum
 
 def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike, has_noise: bool) -> RawFit:
     """Contacts of n samples by Step 2, with friction angles and rods, or rest curvatures of arcs, of shape (n,).
-
-    Without noise there are no covariances and no bends.
-    """
+    Without noise there are no covariances and no bends."""
     from tactile_bayes.mechanics.contacts.single_sample import Room, raw_fits
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
@@ -131,10 +129,8 @@ def _fit_block(reading: Reading, delta: Floats, rods: Rods) -> ContactFit:
 def fit_sheet(
     reading: Reading, delta: Floats, phase: int | None, rods: Rods | ArrayLike = 0.0, is_over: bool = False
 ) -> SheetFit:
-    """Find the best contact of one phase, beyond its edge too, or on the edge (None).
-
-    With `is_over` it starts from a tip that is turned beyond the normal of the contour.
-    """
+    """Find the best contact of one phase, beyond its edge too, or on the edge (None). With `is_over` it starts from a
+    tip that is turned beyond the normal of the contour."""
     descent = _Descent(_Target(reading, delta, rods_of(rods, delta.size)), phase, is_over)
     descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
     return SheetFit(descent.z, descent.covariance(), descent.misfit)
@@ -190,9 +186,8 @@ class _Descent:
 
     def _raw_starts(self) -> list[tuple[Floats, Floats]]:
         """Arc lengths and ψ1 by raw Step 2; where the moment has the wrong sign, with a small one of the right sign.
-
-        Unless all rods are straight and uniform, they follow from the wrong sign too: such rods may be bent both ways.
-        """
+        Unless all rods are straight and uniform, they follow from the wrong sign too: such rods may be bent both
+        ways."""
         reading, rods = self._target.reading, self._target.rods
         moment, least = reading.loads[:, 0], _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
         moments = [np.maximum(moment, least)]

@@ -20,10 +20,8 @@ def golden(low: float, high: float) -> tuple[float, float]:
 def newton_step(
     at: float, value: float, slope: float, positive: float, negative: float, before: float
 ) -> tuple[float, float, float, float]:
-    """Next point, its bracket, and the length of this step, or of the bracket that was halved.
-
-    The function has a value and a slope at a point, and is positive at one end of the bracket.
-    """
+    """Next point, its bracket, and the length of this step, or of the bracket that was halved. The function has a value
+    and a slope at a point, and is positive at one end of the bracket."""
     if value > 0.0:
         positive = at
     else:

@@ -7,7 +7,7 @@ ones. Compiled code (`continuation`) follows the paths one after the other.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +18,13 @@ from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.branches.sweeps import Segments, Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.elastica import Wrench
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-from tactile_bayes.mechanics.rods.profile import MOST_MODES
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
-if TYPE_CHECKING:
-    from tactile_bayes.mechanics.rods.profile import Profile
+# What paths have of their solutions as it is.
+_AS_SOLVED = (
+    *("reach", "distance", "first_angle", "first_parameter", "snap_angle", "snap_parameter", "snap_off", "phases"),
+    "clear_angle",
+)
 
 
 class States(NamedTuple):
@@ -50,14 +53,10 @@ class ContactMode(NamedTuple):
 
 @dataclass(frozen=True)
 class Paths:
-    """Paths of a batch of n contours; see `trace`.
-
-    Arrays have the shape (n,) unless stated otherwise. `reach` says which contours have a path; for the others angles
-    are NaN and loads zero.
-    """
+    """Paths of a batch of n contours; see `trace`. Arrays have the shape (n,) unless stated otherwise. `reach` says
+    which contours have a path; for the others angles are NaN and loads zero."""
 
     sweep_frame: SweepFrame
-    friction_angle: Floats
     reach: NDArray[np.int8]
     distance: Floats  # least distance of the contour from the pivot [L]
     first_angle: Floats  # drive angle of first contact [rad]
@@ -83,10 +82,8 @@ class Paths:
     sampled: Floats  # states at the drive angles given to `trace`, shape (n, k, columns)
 
     def is_clear(self) -> Flags:
-        """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,).
-
-        A drive that carries the base does not bring it to the object again either.
-        """
+        """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,). A drive
+        that carries the base does not bring it to the object again either."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)
 
@@ -101,11 +98,9 @@ class Paths:
         return np.asarray(at[:, 2] + (travels - at[:, 6]) * at[:, 5])
 
     def observables(self, drive_angles: Floats) -> Floats:
-        """Holding moment [EI/L] and forces [EI/L²] in the laboratory frame, shape (n, k, 3); zero out of contact.
-
-        They are interpolated at drive angles in the sweep frame [rad], shape (k,) or (n, k), with an error of some 1e-8
-        of the largest.
-        """
+        """Holding moment [EI/L] and forces [EI/L²] in the laboratory frame, shape (n, k, 3); zero out of contact. They
+        are interpolated at drive angles in the sweep frame [rad], shape (k,) or (n, k), with an error of some 1e-8 of
+        the largest."""
         sign = np.where(self.sweep_frame.mirrored[:, None, None], [-1.0, -1.0, 1.0], 1.0)
         return np.asarray(sign * self._swept(drive_angles).loads)
 
@@ -146,10 +141,8 @@ class Paths:
         ]
 
     def event_states(self) -> States:
-        """Exact states at first contact, at the changes of the phase and at snap-off, shape (n, phases + 1).
-
-        Those of a path are its first `phases + 1`; the others are NaN.
-        """
+        """Exact states at first contact, at the changes of the phase and at snap-off, shape (n, phases + 1). Those of a
+        path are its first `phases + 1`; the others are NaN."""
         return _as_states(self.events)
 
     def event_travels(self) -> Floats:
@@ -172,25 +165,9 @@ def trace(
 ) -> Paths:
     """Follow the equilibria of every contour from first contact to snap-off.
 
-    Parameters
-    ----------
-    sweep_frame, friction_angle, suspension_compliance
-        n contours; friction angles δ = arctan μ [rad], and turns of the pivot's suspension per holding moment, c in
-        (drive angle) = φ0 + c m0 [rad/(EI/L)], for each or for all.
-    contact_compliance
-        Ways of the object along its normal per normal force [L/(EI/L²)], for each or for all.
-    profile : Profile, optional
-        Rod whose rest curvature or rigidity varies along it; by default it is uniform and a circular arc at rest.
-    tolerance : ndarray, shape (3,), optional
-        Tolerated errors of the loads [EI/L and EI/L²], at least 1e-10 of them, for likelihoods, which is several times
-        faster. By default events are computed to rounding.
-    drive_angles, relative, polished
-        Drive angles of states in the sweep frame [rad], shape (k,) or (n, k), or their shares of those from first
-        contact to snap-off. Unless they are polished, states come from the series, with an error of 1e-10 of the
-        largest and without derivatives, in a third of the time.
-    lines : ndarray, shape (1 or n, lines, columns), optional
-        Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
-        after the last. Drive angles are then travels, in rod lengths.
+    Friction and compliances are as in `RigParameters`, of each contour or all; profile, tolerance and `polished` as in
+    `solve_sweeps`. States are at drive angles in the sweep frame, shape (k,) or (n, k), or if these are `relative` at
+    shares of them from first contact to snap-off; with lines as in `Segments`, one or n drives, at travels [L].
     """
     sweeps = _sweeps_of(sweep_frame, friction_angle, suspension_compliance, contact_compliance)
     shapes = shapes_of(sweep_frame.contour, *(sweep_frame.own_domain() if sweep_frame.contour.halves is None else ()))
@@ -201,24 +178,15 @@ def trace(
     has_path = solutions.phases[:, None, None] > 0
     return Paths(
         sweep_frame=sweep_frame,
-        friction_angle=sweeps.friction_angle,
-        reach=solutions.reach,
-        distance=solutions.distance,
-        first_angle=solutions.first_angle,
-        first_parameter=solutions.first_parameter,
-        snap_angle=solutions.snap_angle,
-        snap_parameter=solutions.snap_parameter,
-        snap_off=solutions.snap_off,
         events=np.where(has_path, solutions.event_states[:, : most + 1], 0.0),
-        phases=solutions.phases,
         largest_curvature=solutions.curvature,
-        clear_angle=solutions.clear_angle,
         tolerance=tolerance,
         shapes=shapes,
         sweeps=sweeps,
         profile=profile,
         lines=lines,
         sampled=solutions.states,
+        **{name: getattr(solutions, name) for name in _AS_SOLVED},
     )
 
 

@@ -12,10 +12,8 @@ _JUMP = 0.01  # second difference of a value over a step, in its unit, above whi
 
 
 def central_slopes(values: Callable[[Floats], Floats], point: Floats, steps: Floats | float) -> Floats:
-    """Derivatives of values by central differences, shape (k, d) of a point (d,), by steps (d,); zero at a jump.
-
-    A value jumps if a sample is in contact on one side of the point alone: that is a limit of contours, and no slope.
-    """
+    """Derivatives of values by central differences, shape (k, d) of a point (d,), by steps (d,); zero at a jump. A
+    value jumps if a sample is in contact on one side of the point alone: that is a limit of contours, and no slope."""
     steps = np.broadcast_to(np.asarray(steps, dtype=float), point.shape)
     moves = np.diag(steps)
     found = values(np.concatenate([point + moves, point - moves, point[None]]))

@@ -18,7 +18,5 @@ def robust_deviation(values: Floats) -> float:
 
 def rough_noise(signal: Floats) -> float:
     """Standard deviation of the white noise on a smooth signal, shape (n_samples,), from its median second difference.
-
-    Linear trends have none, and the median removes jumps. That of normal noise has √6 times its standard deviation.
-    """
+    Linear trends have none, and the median removes jumps. That of normal noise has √6 times its standard deviation."""
     return robust_deviation(np.diff(signal, n=2)) / math.sqrt(6.0)

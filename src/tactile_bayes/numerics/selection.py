@@ -13,10 +13,8 @@ def evenly_spread(points: int, most: int) -> Index:
 
 
 def resampled(weights: Floats, count: int, rng: np.random.Generator | np.random.RandomState) -> Index:
-    """Return `count` increasing indices, each as often as its weight, of any sum, demands, rounded at random.
-
-    This is systematic resampling (Kitagawa 1996, doi 10.2307/1390750).
-    """
+    """Return `count` increasing indices, each as often as its weight, of any sum, demands, rounded at random. This is
+    systematic resampling (Kitagawa 1996, doi 10.2307/1390750)."""
     level = np.cumsum(weights)
     picked = np.searchsorted(level / level[-1], (np.arange(count) + rng.random()) / count)
     return np.minimum(picked, len(weights) - 1)

@@ -22,11 +22,9 @@ AXIAL_ALARM = 6.0  # size of the axial score above which the force along the rod
 
 
 def axial_score(samples: Samples, friction: float) -> float:
-    """Return the mean difference of the force along the rod from its value by the moment, over its standard error.
-
-    For rods that vary along their length, it is that of f sin ψ1 at the contact from −f sin δ; NaN without a usable
-    contact.
-    """
+    """Return the mean difference of the force along the rod from its value by the moment, over its standard error. For
+    rods that vary along their length, it is that of f sin ψ1 at the contact from −f sin δ; NaN without a usable
+    contact."""
     if samples.rods.profile is None:
         surplus, variance = _of_arcs(samples, friction)
     else:
@@ -62,11 +60,9 @@ def _of_arcs(samples: Samples, friction: float) -> tuple[Floats, Floats]:
 
 
 def _of_varied_rods(samples: Samples, delta: Floats) -> tuple[Floats, Floats]:
-    """Return D = f (sin ψ1 + sin δ) by Step 2, to first order about the best tangential contact, and its variance.
-
-    D is zero for all tangential contacts, so that its derivatives there follow from the loads. The expectation of
-    second order is subtracted; samples without neighbours one deviation aside are left out.
-    """
+    """Return D = f (sin ψ1 + sin δ) by Step 2, to first order about the best tangential contact, and its variance. D is
+    zero for all tangential contacts, so that its derivatives there follow from the loads. The expectation of second
+    order is subtracted; samples without neighbours one deviation aside are left out."""
     reading, rods = samples.reading, samples.rods
     fit = fit_sheet(reading, delta, TANGENTIAL, rods)
     z = fit.coordinates

@@ -86,10 +86,8 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
 
 
 def _is_ambiguous(fit: RawFit, has_noise: bool) -> Flags:
-    """Return where the other point is a contact elsewhere that is at most 20 times less likely.
-
-    Without a noise level, the deviation of the contact that is found stands for one standard deviation.
-    """
+    """Return where the other point is a contact elsewhere that is at most 20 times less likely. Without a noise level,
+    the deviation of the contact that is found stands for one standard deviation."""
     x, y = (fit.other[:, :2] - fit.place[:, :2]).T
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if not has_noise:

@@ -24,11 +24,9 @@ def turned_sweeps(measured: xr.Dataset, load_cell: LoadCell) -> set[int]:
 
 
 def drive_histories(measured: xr.Dataset, backward: Flags, load_cell: LoadCell, *, rubs: bool) -> Index:
-    """Return the number of each sample's history, shape (samples,), one more than its first sweep; 0 if it has none.
-
-    A sweep that carries the base has its own. If the rod `rubs` on the object, so has a sweep whose drive angle turns
-    back, and one that goes back in contact, `backward` against its direction, goes on with the sweep before it.
-    """
+    """Return the number of each sample's history, shape (samples,), one more than its first sweep; 0 if it has none. A
+    sweep that carries the base has its own. If the rod `rubs` on the object, so has a sweep whose drive angle turns
+    back, and one that goes back in contact, `backward` against its direction, goes on with the sweep before it."""
     sweep, carried = measured.sweep.values, carried_sweeps(measured)
     found = np.where(np.isin(sweep, carried), sweep + 1, 0)
     if not rubs:
@@ -62,10 +60,6 @@ def _goes_on(measured: xr.Dataset, before: Index, own: Index, backward: Flags, g
     at = [measured[name].values for name in ("base_x", "base_y")]
     if any(place[before[0]] != place[own[0]] for place in at) or backward[before[0]] != backward[own[0]]:
         return False
-    return bool(goes_back[own[0]]) or (bool(goes_back[before[0]]) and _begins_in_contact(measured.isel(sample=own)))
-
-
-def _begins_in_contact(sweep: xr.Dataset) -> bool:
-    """Return whether a sweep is loaded from its first sample."""
-    found = quiet_zero_load(sweep)
-    return not found["unloaded"].values[0]
+    if goes_back[own[0]] or not goes_back[before[0]]:
+        return bool(goes_back[own[0]])
+    return not quiet_zero_load(measured.isel(sample=own))["unloaded"].values[0]

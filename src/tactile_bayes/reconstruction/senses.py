@@ -21,11 +21,9 @@ _TWENTY_TO_ONE = 6.0  # difference of misfits at which one of two sides is twent
 
 
 def with_likelier_senses(samples: Samples, measured: xr.Dataset, cell: LoadCell, friction: float) -> Samples:
-    """Return samples with the senses in which they slide, and with those of which it is sure.
-
-    A rod that is turned about a pivot slides as it is turned, and one that is carried as if it were turned on; the
-    other way where a way of the drive fits clearly better so.
-    """
+    """Return samples with the senses in which they slide, and with those of which it is sure. A rod that is turned
+    about a pivot slides as it is turned, and one that is carried as if it were turned on; the other way where a way of
+    the drive fits clearly better so."""
     if not friction:
         return samples
     sense, is_sure = samples.sense.copy(), ~_is_bent(samples)
@@ -68,10 +66,8 @@ def fits_better(one: Samples, other: Samples, friction: float) -> bool:
 
 
 def _misfit(samples: Samples, friction: float) -> float:
-    """Return the sum of squared deviations of loaded samples, with 2 log n for each change between the phases.
-
-    Without it, a sense in which noisy samples have both phases to choose from would fit better.
-    """
+    """Return the sum of squared deviations of loaded samples, with 2 log n for each change between the phases. Without
+    it, a sense in which noisy samples have both phases to choose from would fit better."""
     with np.errstate(over="ignore"):
         usable = np.isfinite(samples.reading.loads**2).all(axis=1)
     some = samples.take(np.flatnonzero(samples.loaded & ~samples.cut_off & usable))
@@ -89,11 +85,9 @@ def _misfit(samples: Samples, friction: float) -> float:
 
 
 def of_any_sense(samples: Samples, friction: float) -> tuple[Samples, Estimate]:
-    """Return samples with the senses in which they touch, and their most likely contacts.
-
-    Where a sense is not sure and does not fit, the rod sticks, and the contact is that of the raw method; or it slides
-    the other way, if the force lies outside the cone of friction there.
-    """
+    """Return samples with the senses in which they touch, and their most likely contacts. Where a sense is not sure and
+    does not fit, the rod sticks, and the contact is that of the raw method; or it slides the other way, if the force
+    lies outside the cone of friction there."""
     found = constrained_estimate(samples, samples.friction_angles(friction))
     assert found.misfit is not None
     with np.errstate(invalid="ignore"):

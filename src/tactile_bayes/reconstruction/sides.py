@@ -34,12 +34,10 @@ _ALL_BUT_OUTLIERS = 0.98
 
 
 def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
-    """Return the side of contact of every sample: +1 as in a forward sweep, −1 as in a backward one, (samples,).
-
-    It is the side of the sweep's direction unless the moment in contact contradicts it by more than six standard
-    errors, for its zero before or after contact, as `zero_load` finds it, and for all zeros that are likely: seemingly
-    unloaded samples may have a constant load. A record may state the sides (`with_sides`).
-    """
+    """Return the side of contact of every sample: +1 as in a forward sweep, −1 as in a backward one, (samples,). It is
+    the side of the sweep's direction unless the moment in contact contradicts it by more than six standard errors, for
+    its zero before or after contact, as `zero_load` finds it, and for all zeros that are likely: seemingly unloaded
+    samples may have a constant load. A record may state the sides (`with_sides`)."""
     sides, _ = sides_and_doubts(record, load_cell)
     backward = [sweep for sweep, side in sides.items() if side == "backward"]
     return np.where(record.sweep.isin(backward), -1.0, 1.0)

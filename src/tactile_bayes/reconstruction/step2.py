@@ -198,10 +198,8 @@ def _before_it_yielded(contacts: xr.Dataset, samples: Samples, compliance: float
 def _with_likelier_sides(
     measured: xr.Dataset, cell: LoadCell, suspension_compliance: float, friction: float
 ) -> tuple[xr.Dataset, dict[int, str]]:
-    """Return the record with the sides of its sweeps stated, and the sides of doubtful sweeps.
-
-    A doubtful sweep takes the side of its direction unless the misfit of the other is clearly smaller.
-    """
+    """Return the record with the sides of its sweeps stated, and the sides of doubtful sweeps. A doubtful sweep takes
+    the side of its direction unless the misfit of the other is clearly smaller."""
     taken: dict[int, str] = {}
     sides, doubtful = sides_and_doubts(_in_channels(measured, cell), cell)
     for sweep in doubtful:
@@ -263,10 +261,8 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset, frict
 
 
 def _slope_ends(estimate: Estimate, samples: Samples, friction: float) -> Floats:
-    """Return the least and the greatest slope that friction allows in the laboratory frame, shape (2, n).
-
-    The force lies within the cone of friction about the contour's normal, at an edge of it if the rod slides.
-    """
+    """Return the least and the greatest slope that friction allows in the laboratory frame, shape (2, n). The force
+    lies within the cone of friction about the contour's normal, at an edge of it if the rod slides."""
     slope, most = estimate.place[:, 2], np.where(samples.is_sure, 0.0, np.arctan(friction))
     ends = np.stack([slope + (samples.sense + way) * most for way in (-1.0, 1.0)])
     return np.sort(samples.side * (ends - samples.rod.surface.half_angle), axis=0)

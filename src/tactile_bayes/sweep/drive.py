@@ -93,11 +93,8 @@ class Rotation:
 
 
 class Carried(ABC):
-    """Drive that carries the base along a path: straight lines from pose to pose.
-
-    It makes one sweep, which is called forward if the rod touches the object with its left side, as in a
-    counter-clockwise rotation, and else backward.
-    """
+    """Drive that carries the base along a path: straight lines from pose to pose. It makes one sweep, which is called
+    forward if the rod touches the object with its left side, as in a counter-clockwise rotation, and else backward."""
 
     drive_step: float | None
 

@@ -133,10 +133,8 @@ def sweep_paths(
 
 def carried_paths(contour: Contour, drive: Carried, travels: Floats, acts: Acting) -> tuple[Paths, Direction]:
     """Compute the exact path of a rod that a drive carries along one contour, and the direction that its side implies.
-
     It touches the object with its left side, as a forward sweep does, or with its right side. States are computed at
-    the travels. Errors are those of `scan`.
-    """
+    the travels. Errors are those of `scan`."""
     rod, poses = acts.rod, drive.poses
     base = float(poses[0, 0]), float(poses[0, 1])
     way = float(np.abs(poses[:, 0] - base[0]).max()) / rod.length

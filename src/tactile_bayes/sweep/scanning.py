@@ -317,9 +317,7 @@ def _paths_of(contour: Contour, drive: Drive, acts: Acting) -> Iterator[tuple[Pa
 
 def _sampled(drive: Drive, every: Floats, sweep: SweepEvents) -> tuple[Index, Floats]:
     """Indices of the drive angles or travels that are sampled, in the order of the drive, and poses of the base there.
-
-    Where a rod is in another contact, its state is not known.
-    """
+    Where a rod is in another contact, its state is not known."""
     if isinstance(drive, Carried):
         chosen = np.flatnonzero(~(every > (sweep.touches_again if sweep.clear else sweep.snap_off.travel)))
         return chosen, drive.at(every[chosen])

@@ -22,12 +22,9 @@ def blind_angles(drive_step: float) -> Floats:
 
 
 def record_template(drives: Sequence[Drive], drive_angles: Floats, rod: Rod | None, load_cell: LoadCell) -> xr.Dataset:
-    """Return a record of sweeps by every drive, with loads of zero.
-
-    Its drive angles include the encoder's offset and backlash.
-
-    The angles are of rotations without a grid of their own; drives that carry the base have as many samples.
-    """
+    """Return a record of sweeps by every drive, with loads of zero. Its drive angles include the encoder's offset and
+    backlash. The angles are of rotations without a grid of their own; drives that carry the base have as many
+    samples."""
     parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
     length = 1.0 if rod is None else rod.length
     sweeps = [sweep for drive in drives for sweep in _sweeps_of(drive, np.sort(drive_angles), length)]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from helpers.integration import ATOL, RTOL
+from helpers.contours_drawn import mirrored
+from helpers.integration import rod
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TIP
-from tactile_bayes.mechanics.reachability import Reachability, SnapOff
+from tactile_bayes.mechanics.reachability import Reachability
 
 COUNT = 30
 RNG = np.random.default_rng(11)
@@ -38,22 +38,9 @@ def traced(contour, curvature, *, backward=False, friction=0.0, compliance=0.0, 
     )
 
 
-def mirrored(contour):
-    if isinstance(contour, Joined):
-        return Joined(mirrored(contour.right), mirrored(contour.left))
-    values = {**vars(contour), "x_c": -np.asarray(contour.x_c)}
-    return type(contour)(**values)
-
-
 def integrated(state, curvature, **options):
     """x, y, slope and curvature of the rod from the pivot to the contact, from the drive angle and loads of a state."""
-    drive_angle, moment, force_x, force_y, arclength = state[5:10]
-
-    def slope(_s, z):
-        return [np.cos(z[2]), np.sin(z[2]), z[3], force_y * np.cos(z[2]) - force_x * np.sin(z[2])]
-
-    start = [0.0, 0.0, drive_angle, curvature - moment]
-    return solve_ivp(slope, (0.0, arclength), start, rtol=RTOL, atol=ATOL, **options).y
+    return rod(state[5:9], state[9], rest=curvature, **options).y
 
 
 @pytest.mark.parametrize("curvature", [-0.8, 0.05, 0.6])
@@ -68,7 +55,7 @@ def test_states_satisfy_the_integrated_equations(name, curvature, backward, fric
     for state in states[:: max(1, len(states) // 8)]:
         phase, _, x, y, alpha, _, _, force_x, force_y, arclength, tip_angle = state[:11]
         gamma, sticks = state[12:14]
-        end = integrated(state, own, method="DOP853")[:, -1]
+        end = integrated(state, own)[:, -1]
         assert end == pytest.approx([x, y, tip_angle, own], abs=1e-10)
         assert np.arctan2(-force_x, force_y) == pytest.approx(alpha + gamma, abs=1e-12)
         assert abs(gamma) <= np.arctan(friction) if sticks else abs(gamma) == np.arctan(friction)
@@ -94,28 +81,6 @@ def test_a_straight_rod_is_the_limit(name):
     far, near = (np.abs(one.snap_angle - straight.snap_angle)[there] for one in (small, smaller))
     assert far.max() < 1e-4
     np.testing.assert_allclose(near, 0.1 * far, atol=1e-3 * far.max())
-
-
-@pytest.mark.parametrize("curvature", [-0.6, 0.7])
-def test_the_drive_angle_of_a_fold_is_the_greatest_nearby(curvature):
-    """Of the states before it, to the resolution of the samples; and the drive angles in contact end there."""
-    paths = traced(CONTOURS["parabola"], curvature)
-    folds = np.flatnonzero((paths.reach == Reachability.TOUCHES) & (paths.snap_off == SnapOff.FOLD))
-    assert folds.size > 5
-    for i in folds:
-        contact = paths.sampled[i, :, 0] != NONE
-        np.testing.assert_array_equal(contact, (paths.first_angle[i] <= ANGLES) & (paths.snap_angle[i] >= ANGLES))
-
-
-def test_a_rod_curved_against_the_load_is_straightened_first():
-    """Its contact then moves outward, to greater parameters, before it moves inward."""
-    paths = traced(CONTOURS["circle"], 0.8)
-    there = paths.reach == Reachability.TOUCHES
-    parameter = np.where(paths.sampled[..., 0] != NONE, paths.sampled[..., 1], -np.inf).max(axis=1)
-    assert np.mean(parameter[there] > paths.first_parameter[there]) > 0.5
-    straight = traced(CONTOURS["circle"], 0.0)
-    parameter = np.where(straight.sampled[..., 0] != NONE, straight.sampled[..., 1], -np.inf).max(axis=1)
-    assert np.all(parameter <= straight.first_parameter)
 
 
 def _inside(contour, i, x, y):

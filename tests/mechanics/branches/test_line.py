@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar, root
 
-from helpers.integration import ATOL, RTOL
+from helpers.profiled_rods import integrated_pose, rod_along
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.branches.line import lines_through
@@ -22,6 +21,7 @@ TURN = np.array([[0.9, 0.0, 0.9], [-0.7, 0.1, 1.7]])
 FAR_TURN = np.array([[0.9, 0.0, 0.9], [-1.2, 0.1, 2.0]])
 SHIFT = np.array([[0.9, 0.05, 1.1], [-0.8, 0.05, 1.1]])
 TAPERED = Rod(taper=0.5).as_profile()
+STRAIGHT = rod_along(0.0, 1.0, 0.0)
 
 
 def carried(contour, poses, ways=(), *, backward=False, friction=0.0, compliance=0.0, curvature=0.0, profile=None):
@@ -44,23 +44,12 @@ def _taper(profile: Profile | None) -> float:
     return 0.0 if profile is None else profile.taper
 
 
-def base_of(contact, force, friction, arclength, curvature, compliance, taper):
+def base_of(contact, force, friction, arclength, compliance, rod):
     """Pose of the base from the contact, (x, y, slope angle, slope of the rod there), by integration."""
     x, y, alpha, slope = contact
-    beta = alpha + friction
-    force_x, force_y = -force * np.sin(beta), force * np.cos(beta)
-
-    def rates(s, z):
-        rigidity = (1.0 - taper * s) ** 4
-        return [
-            np.cos(z[2]),
-            np.sin(z[2]),
-            curvature + z[3] / rigidity,
-            force_y * np.cos(z[2]) - force_x * np.sin(z[2]),
-        ]
-
-    end = solve_ivp(rates, (arclength, 0.0), [x, y, slope, 0.0], method="DOP853", rtol=RTOL, atol=ATOL).y[:, -1]
-    return end[0], end[1], end[2] - compliance * end[3]
+    u, v, turn = integrated_pose(rod, slope - alpha - friction, arclength, force)
+    cos, sin = np.cos(alpha + friction), np.sin(alpha + friction)
+    return x - u * cos + v * sin, y - u * sin - v * cos, slope + turn + compliance * force * u
 
 
 def drawn(number):
@@ -81,6 +70,7 @@ def test_states_satisfy_the_integrated_equations(number):
     """From the contact and its force the rod ends at the base, where the drive has brought it."""
     contour, poses, rig = drawn(number)
     friction, compliance, curvature, profile = rig.values()
+    rod = rod_along(curvature, 1.0, _taper(profile))
     whole = np.linalg.norm(poses[1] - poses[0])
     ways = np.linspace(0.0, whole, 25)
     paths = carried(contour, poses, ways, **rig)
@@ -96,9 +86,9 @@ def test_states_satisfy_the_integrated_equations(number):
         assert abs(delta) == pytest.approx(friction, abs=1e-10)
         assert arclength == 1.0 if phase == TIP else slope == pytest.approx(alpha, abs=1e-10)
         contact, force = (x, y, alpha, slope), np.hypot(force_x, force_y)
-        found = base_of(contact, force, delta, arclength, curvature, compliance, _taper(profile))
+        found = base_of(contact, force, delta, arclength, compliance, rod)
         expected = (poses[1] - poses[0]) * way / whole + [0.0, 0.0, poses[0, 2]]
-        # The compliance turns the base by the moment, of which the integration returns −m0.
+        # The compliance turns the base by the moment.
         assert found == pytest.approx(expected, abs=2e-10)
         assert moment == pytest.approx(
             force * (x - found[0]) * np.cos(alpha + delta) + force * (y - found[1]) * np.sin(alpha + delta), abs=1e-9
@@ -166,7 +156,7 @@ def test_a_fold_is_the_greatest_travel(poses, contour):
             arclength = 1.0
             if not tip:
                 contact, arclength = (*contact[:3], contact[2]), z[1]
-            pose = np.array(base_of(contact, force, 0.0, arclength, 0.0, 0.0, 0.0)) - poses[0]
+            pose = np.array(base_of(contact, force, 0.0, arclength, 0.0, STRAIGHT)) - poses[0]
             way = pose @ along
             return way, pose - way * along
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_trapezoid, solve_ivp
+from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq
 
+from helpers.integration import rod
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.paths import trace
@@ -21,16 +22,9 @@ BACK = Motion(x=THERE, y=0.0 * THERE, drive_angle=0.5 * np.pi + 0.0 * THERE)
 
 def rod_under(state):
     """Position and direction along a rod that the loads at its base bend, by integration of its equation."""
-    moment, x, y, angle = (float(state[name]) for name in ("holding_moment", "force_x", "force_y", "drive_angle"))
-
-    def rate(_, at):
-        return [np.cos(at[2]), np.sin(at[2]), -curvature(at)]
-
-    def curvature(at):
-        return moment - (at[0] * y - at[1] * x)
-
-    found = solve_ivp(rate, (0.0, 1.0), [0.0, 0.0, angle], rtol=1e-12, atol=1e-13, dense_output=True).sol
-    return found, lambda s: curvature(found(s))
+    wrench = [float(state[name]) for name in ("drive_angle", "holding_moment", "force_x", "force_y")]
+    found = rod(wrench, 1.0, dense_output=True, max_step=0.02).sol
+    return found, lambda s: -found(s)[3]
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from helpers import integrated_step2
-from helpers.integration import ATOL, RTOL
+from helpers.integration import rod
+from helpers.single_states import assert_slopes_are_differences
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.contacts.contact_coordinates import (
     DRIVE_ANGLE,
@@ -52,15 +52,9 @@ class Arcs:
         return contact_from_wrench(*wrench, self.delta, side=side, rest_curvature=side * self.curvature)
 
 
-def integrated(drive_angle, moment, force_x, force_y, curvature, arclengths):
+def integrated(wrench, curvature, arclengths):
     """x, y, slope and curvature at arc lengths, from the pivot."""
-
-    def slope(_s, z):
-        return [np.cos(z[2]), np.sin(z[2]), z[3], force_y * np.cos(z[2]) - force_x * np.sin(z[2])]
-
-    start = [0.0, 0.0, drive_angle, curvature - moment]
-    solution = solve_ivp(slope, (0.0, arclengths[-1]), start, "DOP853", arclengths, rtol=RTOL, atol=ATOL)
-    return solution.y
+    return rod(wrench, arclengths[-1], rest=curvature, t_eval=arclengths).y
 
 
 # --- Contact coordinates → wrench and place -----------------------------------------------------------------------
@@ -121,8 +115,8 @@ def test_step2_is_that_of_the_integrated_rod():
     arcs = Arcs()
     found = arcs.found()
     for k, arclength in enumerate(found.contact_arclength):
-        wrench = arcs.z[k, DRIVE_ANGLE], *arcs.loads[:, k], arcs.curvature[k]
-        x, y, slope, curvature = integrated(*wrench, np.linspace(0.0, arclength, 50))
+        wrench = arcs.z[k, DRIVE_ANGLE], *arcs.loads[:, k]
+        x, y, slope, curvature = integrated(wrench, arcs.curvature[k], np.linspace(0.0, arclength, 50))
         end = [x[-1], y[-1], slope[-1], curvature[-1]]
         right = [found.contact_x[k], found.contact_y[k], found.tip_angle[k], arcs.curvature[k]]
         np.testing.assert_allclose(end, right, atol=1e-10)
@@ -207,8 +201,7 @@ def test_wrenches_integrate_to_their_contacts(side):
     assert (out.phase != NONE).all()
     assert {TIP, TANGENTIAL} == set(out.phase)
     for k, arclength in enumerate(out.contact_arclength):
-        wrench = out.drive_angle[k], out.holding_moment[k], out.force_x[k], out.force_y[k], own[k]
-        end = integrated(*wrench, [arclength])[:, -1]
+        end = integrated([values[k] for values in out[:4]], own[k], [arclength])[:, -1]
         np.testing.assert_allclose(end, [side * x[k], y[k], out.tip_angle[k], own[k]], atol=1e-10)
         slope = side * alpha[k] if side > 0 else np.pi - alpha[k]
         assert arclength == 1.0 if out.phase[k] == TIP else end[2] == pytest.approx(slope, abs=1e-10)
@@ -238,21 +231,7 @@ def test_straight_wrenches_are_the_limit():
 
 def test_derivatives_of_the_drive_angle_are_those_of_differences():
     arcs = Arcs(300, seed=6, curvatures=(-2.0, 0.3))
-    x, y, alpha, _ = arcs.place
-    out = wrench_from_contact(x, y, alpha, arcs.delta, rest_curvature=arcs.curvature)
-    step = 1e-5
-
-    def angle(stretch, slope):
-        known = {"rest_curvature": arcs.curvature, "phase": out.phase}
-        return wrench_from_contact(stretch * x, stretch * y, alpha + slope, arcs.delta, **known).drive_angle
-
-    by_slope = (angle(1.0, step) - angle(1.0, -step)) / (2.0 * step)
-    # r² changes by 4 ε of itself between points stretched by 1 ± ε.
-    by_distance = (angle(1.0 + step, 0.0) - angle(1.0 - step, 0.0)) / (4.0 * step * (x * x + y * y))
-    for found, right in ((out.by_slope, by_slope), (out.by_distance, by_distance)):
-        smooth = np.abs(right) < 20.0  # near the end of the rod's reach there is no difference to take
-        assert smooth.mean() > 0.7
-        np.testing.assert_allclose(found[smooth], right[smooth], rtol=1e-5, atol=1e-6)
+    assert_slopes_are_differences(*arcs.place[:3], arcs.delta, atol=1e-6, rest_curvature=arcs.curvature)
 
 
 def test_contacts_out_of_reach_have_no_wrench():
@@ -286,7 +265,7 @@ def test_the_rod_between_pivot_and_contact_is_the_integrated_one_and_beyond_it_a
     s = np.linspace(0.0, 1.0, 21)
     for k, arclength in enumerate(arcs.place[3]):
         until = np.append(s[s < arclength], arclength)
-        inner = integrated(*wrenches[:, k], own[k], until)
+        inner = integrated(wrenches[:, k], own[k], until)
         (end_x, end_y, start, _), end = inner[:, -1], inner[2, -1] + own[k] * (s[s >= arclength] - arclength)
         right_x = np.append(inner[0, :-1], end_x + (np.sin(end) - np.sin(start)) / own[k])
         right_y = np.append(inner[1, :-1], end_y - (np.cos(end) - np.cos(start)) / own[k])
@@ -309,6 +288,6 @@ def test_the_largest_change_of_curvature_is_that_of_the_integrated_rod(side):
     out = wrench_from_contact(side * x, y, side * alpha, delta, side=side, rest_curvature=own)
     found = largest_curvature(out, own)
     for k, arclength in enumerate(out.contact_arclength):
-        wrench = out.drive_angle[k], out.holding_moment[k], out.force_x[k], out.force_y[k], own[k]
-        change = integrated(*wrench, np.linspace(0.0, arclength, 400))[3] - own[k]
+        wrench = [values[k] for values in out[:4]]
+        change = integrated(wrench, own[k], np.linspace(0.0, arclength, 400))[3] - own[k]
         assert found[k] == pytest.approx(np.abs(change).max(), rel=1e-4)

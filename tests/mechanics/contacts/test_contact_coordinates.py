@@ -1,4 +1,4 @@
-"""The touching rod in its own coordinates, against `elastica`, integration, and derivatives by the complex step."""
+"""The touching rod in its own coordinates, against integration, and derivatives by the complex step."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,6 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
     contact_states_and_slopes,
     place_by_wrench,
 )
-from tactile_bayes.mechanics.elastica import contact_from_wrench, wrench_from_contact
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
 PHASES = pytest.mark.parametrize("phase", [TIP, TANGENTIAL], ids=["tip", "tangential"])
@@ -33,7 +32,7 @@ class Rods(NamedTuple):
     delta: np.ndarray
 
 
-def some_rods(phase, amplitudes, *, seed, count=70, shortest=0.02, steepest=1.5):
+def some_rods(phase, amplitudes, *, seed, count=70, shortest=0.02):
     """Rods of one phase, half of them with friction, of these amplitudes and ones between."""
     rng = np.random.default_rng(seed)
     delta = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(0.0, 0.65, count))
@@ -42,7 +41,7 @@ def some_rods(phase, amplitudes, *, seed, count=70, shortest=0.02, steepest=1.5)
     chi = np.where(rng.random(count) < 0.5, chi, between)
     psi1, arclength = -delta, np.ones(count)
     if phase == TIP:
-        psi1 = psi1 + rng.uniform(0.02, 1.0, count) * (steepest + delta)
+        psi1 = psi1 + rng.uniform(0.02, 1.0, count) * (1.5 + delta)
     else:
         arclength = np.exp(rng.uniform(np.log(shortest), np.log(0.999), count))
     force = (ellipkinc(chi, 0.5 * (1.0 - np.sin(psi1))) / arclength) ** 2
@@ -63,31 +62,6 @@ def assert_slopes_agree(found, right, tolerance):
 
 
 @PHASES
-def test_loads_and_place_are_those_of_elastica(phase):
-    """Not for a force nearly along the rod: a contact that is rounded to doubles does not tell it to 1e-11."""
-    rods = some_rods(phase, BENT, seed=1, count=400, steepest=1.2)
-    rod = contact_states(*rods)
-    x, y, alpha, arclength = rod.place
-    wrench = wrench_from_contact(x, y, alpha, rods.delta)
-    assert (wrench.phase == phase).all()
-    force = rods.coordinates[:, FORCE]
-    for found, right in zip(rod.loads, (wrench.holding_moment, wrench.force_x, wrench.force_y), strict=True):
-        np.testing.assert_allclose(found / force, right / force, rtol=0.0, atol=1e-11)
-    np.testing.assert_allclose(rods.coordinates[:, DRIVE_ANGLE], wrench.drive_angle, rtol=0.0, atol=1e-11)
-    np.testing.assert_allclose(arclength, wrench.contact_arclength, rtol=0.0, atol=1e-11)
-    psi1 = wrench.tip_angle - alpha - rods.delta
-    np.testing.assert_allclose(rods.coordinates[:, PSI1], psi1, rtol=0.0, atol=1e-11)
-
-
-@PHASES
-def test_step2_gives_the_place_back_also_of_weak_loads(phase):
-    rods = some_rods(phase, BENT + WEAK, seed=2, count=400)
-    rod = contact_states(*rods)
-    contact = contact_from_wrench(rods.coordinates[:, DRIVE_ANGLE], *rod.loads, rods.delta, side=1.0)
-    np.testing.assert_allclose(np.stack(contact[:4]), rod.place, rtol=0.0, atol=1e-11)
-
-
-@PHASES
 def test_integration_agrees(phase):
     rods = some_rods(phase, BENT + WEAK, seed=3, count=200)
     loads, place = integrated_step2.touched(*rods)
@@ -97,18 +71,12 @@ def test_integration_agrees(phase):
     np.testing.assert_allclose(rod.place.T, place.real, rtol=0.0, atol=1e-12)
 
 
-def test_slopes_come_with_the_same_values():
-    rods = some_rods(TIP, BENT, seed=4)
-    for found, right in zip(contact_states_and_slopes(*rods)[0], contact_states(*rods), strict=True):
-        np.testing.assert_array_equal(found, right)
-
-
-def test_friction_may_be_one_number():
-    coordinates = some_rods(TIP, BENT, seed=5).coordinates
-    for found, right in zip(
-        contact_states(coordinates, 0.3), contact_states(coordinates, np.full(70, 0.3)), strict=True
-    ):
-        np.testing.assert_array_equal(found, right)
+def test_slopes_come_with_the_same_values_and_friction_may_be_one_number():
+    z = some_rods(TIP, BENT, seed=4).coordinates
+    right = contact_states(z, np.full(70, 0.3))
+    for other in (contact_states_and_slopes(z, np.full(70, 0.3))[0], contact_states(z, 0.3)):
+        for found, expected in zip(other, right, strict=True):
+            np.testing.assert_array_equal(found, expected)
 
 
 def test_what_is_no_rod_is_nan_and_leaves_the_others():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from helpers.profiled_rods import given_rod, given_rods, integrated
+from helpers.single_states import assert_slopes_are_differences
 from tactile_bayes.mechanics.elastica import contact_from_wrench, wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.rods.profile import profile_of
@@ -80,22 +81,7 @@ def test_a_straight_uniform_rod_is_the_limit():
 
 @pytest.mark.parametrize("name", ["cone", "curved to its tip", "wavy", "tables"])
 def test_derivatives_of_the_drive_angle_are_those_of_differences(name):
-    x, y, alpha, delta = contacts(60)
-    profile = RODS[name].plain.profile
-    out = wrench_from_contact(x, y, alpha, delta, profile=profile)
-    step = 1e-5
-
-    def angle(stretch, slope):
-        known = {"profile": profile, "phase": out.phase}
-        return wrench_from_contact(stretch * x, stretch * y, alpha + slope, delta, **known).drive_angle
-
-    by_slope = (angle(1.0, step) - angle(1.0, -step)) / (2.0 * step)
-    # r² changes by 4 ε of itself between points stretched by 1 ± ε.
-    by_distance = (angle(1.0 + step, 0.0) - angle(1.0 - step, 0.0)) / (4.0 * step * (x * x + y * y))
-    for found, right in ((out.by_slope, by_slope), (out.by_distance, by_distance)):
-        smooth = np.abs(right) < 20.0
-        assert smooth.mean() > 0.7
-        np.testing.assert_allclose(found[smooth], right[smooth], rtol=1e-5, atol=1e-5)
+    assert_slopes_are_differences(*contacts(60), atol=1e-5, profile=RODS[name].plain.profile)
 
 
 @pytest.mark.parametrize("side", [1, -1])

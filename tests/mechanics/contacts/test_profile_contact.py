@@ -184,12 +184,6 @@ def test_a_rod_at_rest_is_the_integrated_one(name):
         np.testing.assert_allclose(chord(rod.profile, at.distance, WORK), at, rtol=0, atol=1e-12)
 
 
-def test_a_distance_that_a_curled_rod_does_not_have_is_that_of_its_farthest_point():
-    profile = profile_of(5.0)
-    at = chord(profile, 0.5, WORK)
-    np.testing.assert_allclose([at.distance, at.bearing], [0.4, 0.5 * math.pi], atol=1e-8)
-
-
 @pytest.mark.parametrize("name", RODS)
 def test_the_largest_bending_is_that_of_close_points(name):
     rod = RODS[name]

@@ -157,23 +157,3 @@ def test_tip_map_over_its_domain():
     assert np.all(np.abs(found1 - epsilon1) <= worth * 20)
     for one, other in zip(of, arc_to(found, np.sin(0.5 * found1) ** 2), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-15)
-
-
-@pytest.mark.parametrize("chi", [0.5, 1.2, 2.2, 3.0])
-@pytest.mark.parametrize("psi1", [0.05, 0.5, 1.1])
-def test_tip_map_against_legendre(chi, psi1):
-    m = 0.5 * (1 - np.sin(psi1))
-    theta = float(np.arctan2(np.cos(chi), np.sqrt(1 - m) * np.sin(chi)))
-    tau, u, v = piece(theta, m)
-    deficit, chord_angle = np.sqrt(1 - (u * u + v * v) / tau**2), np.arctan2(u, v)
-    found, found1, arc = tip_arcs(np.array([deficit]), np.array([chord_angle]), chi + 0.02, HALF - psi1 - 0.02)
-    np.testing.assert_allclose(found, chi, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(found1, HALF - psi1, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(arc.length, tau, rtol=0, atol=1e-11)
-
-
-def test_a_straight_tip_lies_along_its_chord():
-    found, found1, arc = tip_arcs(np.zeros(3), np.array([0.1, 0.9, 1.5]), np.zeros(3), np.array([0.11, 0.8, 1.49]))
-    np.testing.assert_array_equal(found, 0.0)
-    np.testing.assert_array_equal(found1, [0.1, 0.9, 1.5])
-    np.testing.assert_array_equal(arc.length, 0.0)

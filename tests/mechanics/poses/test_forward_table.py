@@ -14,7 +14,7 @@ from tactile_bayes.mechanics.rods.profile import profile_of
 from tactile_bayes.mechanics.rods.rod import Rod
 
 _beam_of, _beam_pose, _chord_to, _prepare = beam.beam_of, beam.beam_pose, beam.chord_to, forward_table.prepare
-_Varied, _mirrored_beam = beam.Varied, beam.mirrored_beam
+_Varied, _mirrored_beam, _most = beam.Varied, beam.mirrored_beam, taylor.most_rest_curvature
 
 RODS = {name: drawn_rods()[name].profile for name in ("uniform", "half cone", "cone", "parabolic")}
 
@@ -23,30 +23,36 @@ ERROR, ERROR_OF_SLOPES = 1e-5, 1e-3
 
 
 @cached
-def _poses(varied, table, delta, psi1, arclength, force, tip, out):
+def _rod_of(varied, table, delta, stem):
+    """The beam, and whether the table holds it."""
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, delta, varied.sheet) else 0.0
-    rod = _beam_of(
-        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), 0.0
-    )
+    rod = _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0)
+    return _beam_of(0.0, rod, stem), slenderness > 0.0
+
+
+@cached
+def _poses(varied, table, delta, psi1, arclength, force, tip, out):
+    rod, held = _rod_of(varied, table, delta, 0.0)
     for i in range(psi1.size):
         for k, pose in enumerate(_beam_pose(rod, psi1[i], arclength[i], force[i], tip)):
             out[i, k, 0], out[i, k, 1], out[i, k, 2] = pose
-    return slenderness > 0.0
+    return held
 
 
 @cached
 def _chords(varied, table, stem, mirrored, distances, out):
-    profile = varied.profile
-    slenderness = table.slenderness if _prepare(table, profile, 0.0, varied.sheet) else 0.0
-    rod = _beam_of(
-        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), stem
-    )
+    rod, held = _rod_of(varied, table, 0.0, stem)
     if mirrored:
         rod = _mirrored_beam(rod)
     for i in range(distances.size):
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = _chord_to(rod, distances[i])
-    return slenderness > 0.0
+    return held
+
+
+@cached
+def bound(profile):
+    return _most(profile)
 
 
 def poses(profile, table, delta, psi1, arclength, force, tip):
@@ -54,6 +60,13 @@ def poses(profile, table, delta, psi1, arclength, force, tip):
     columns = [np.array(a, dtype=float) for a in np.broadcast_arrays(psi1, arclength, force)]
     out = np.empty((columns[0].size, 3, 3))
     return _poses(beam.varied(profile), table, delta, *columns, tip, out), out
+
+
+def assert_integrated(profile, table, tip, places):
+    """Beyond the ranges of a table that holds the rod poses are those without one."""
+    held, found = poses(profile, table, 0.0, *np.transpose(places), tip)
+    assert held
+    np.testing.assert_array_equal(found, poses(profile, NO_TABLE, 0.0, *np.transpose(places), tip)[1])
 
 
 def length(profile, arclength):
@@ -97,10 +110,7 @@ def test_poses_of_a_rod_with_a_bend_need_a_fine_table(sign):
     assert tabulated(profile, box) is NO_TABLE
     table = tabulated(profile, box, grade=1)
     compared(profile, table, 0.3)
-    far = np.array([[-0.7, 1.0, 1.0], [2.5, 1.0, 1.0], [0.2, 1.0, 21.0]]).T
-    held, found = poses(profile, table, 0.0, *far, True)
-    assert held
-    np.testing.assert_array_equal(found, poses(profile, NO_TABLE, 0.0, *far, True)[1])
+    assert_integrated(profile, table, True, [[-0.7, 1.0, 1.0], [2.5, 1.0, 1.0], [0.2, 1.0, 21.0]])
 
 
 @pytest.mark.parametrize("sign", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
@@ -134,12 +144,8 @@ def test_beyond_its_ranges_a_pose_is_integrated():
     for far in ({"taper": 0.56}, {"taper": 0.44}, {"bend": -0.11}):
         assert not poses(profile._replace(**far), table, 0.0, [0.1], [1.0], [1.0], True)[0]
     assert not poses(profile, table, 0.51, [0.1], [1.0], [1.0], True)[0]
-    tip = np.array([[-1.1, 1.0, 1.0], [1.5, 1.0, 1.0], [0.2, 1.0, 40.0]]).T
-    tangential = np.array([[0.0, -0.01, 1.0], [0.0, 1.4, 1.0], [0.0, 0.5, 400.0]]).T
-    for places, is_tip in ((tip, True), (tangential, False)):
-        held, found = poses(profile, table, 0.0, *places, is_tip)
-        assert held
-        np.testing.assert_array_equal(found, poses(profile, NO_TABLE, 0.0, *places, is_tip)[1])
+    assert_integrated(profile, table, True, [[-1.1, 1.0, 1.0], [1.5, 1.0, 1.0], [0.2, 1.0, 40.0]])
+    assert_integrated(profile, table, False, [[0.0, -0.01, 1.0], [0.0, 1.4, 1.0], [0.0, 0.5, 400.0]])
 
 
 @pytest.mark.parametrize("stem", [0.0, 0.2])
@@ -174,14 +180,6 @@ def test_the_bound_of_the_rest_curvature_is_not_below_it():
             s = np.linspace(0.0, 1.0, 1001)
             most = max(sign * (rod.curvature(at) + 0.1) for at in s)
             assert bound(profile) >= most - 1e-9
-
-
-@cached
-def bound(profile):
-    return _most(profile)
-
-
-_most = taylor.most_rest_curvature
 
 
 def test_strong_friction_of_a_hooked_rod_needs_a_small_range_of_the_force():

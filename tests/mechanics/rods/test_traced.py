@@ -46,9 +46,14 @@ def test_exact_points_give_the_rest_curvature(name, miss):
     np.testing.assert_allclose(rod.rest_curvature(S), CURVATURES[name](S), atol=miss)
 
 
-def drawn_curvature(rng, scale=0.5):
+def noisy(x, y, scatter, rng):
+    noise = rng.normal(0.0, scatter, (2, x.size))
+    return x + noise[0], y + noise[1]
+
+
+def drawn_curvature(rng):
     """Return a random smooth function with a correlation length of half a rod."""
-    waves, phases = rng.normal(0.0, 1.0 / scale, 40), rng.uniform(0.0, 2.0 * np.pi, 40)
+    waves, phases = rng.normal(0.0, 2.0, 40), rng.uniform(0.0, 2.0 * np.pi, 40)
     size = rng.uniform(0.3, 2.0) * np.sqrt(2.0 / 40.0)
     return lambda s: size * np.cos(np.multiply.outer(s, waves) + phases).sum(axis=-1)
 
@@ -61,24 +66,25 @@ def standardised(curvature, x, y, scatter=None):
     return np.append((rod.rest_curvature(S) - curvature(S)) / rod.deviation(S), off / rod.deviation_of_mean)
 
 
+def squares_of_drawn_rods(rng, count, points, scatter, given):
+    """Mean squares of standardised errors over drawn rods, traced at so many points."""
+    errors = []
+    for _ in range(count):
+        curvature = drawn_curvature(rng)
+        traced = noisy(*points_of(curvature, np.linspace(0.0, 1.0, points)), scatter, rng)
+        errors.append(standardised(curvature, *traced, given))
+    return np.mean(np.square(errors), axis=0)
+
+
 @pytest.mark.parametrize(
     ("scatter", "given"), [(0.02, None), pytest.param(0.2, None, marks=pytest.mark.slow), (0.2, 0.2)]
 )
 def test_deviations_are_those_of_the_errors(scatter, given):
     """Over drawn rods, at the ends too: mean squares of 60 standardised errors are below the chi-square limit of 1e-6.
-
-    The drawn rods are smoother than the prior, so that errors may be half as large as stated.
-    """
-    rng, count = np.random.default_rng(9), 60
-    errors = []
-    for _ in range(count):
-        curvature = drawn_curvature(rng)
-        x, y = points_of(curvature, np.linspace(0.0, 1.0, 40))
-        noise = rng.normal(0.0, scatter, (2, x.size))
-        errors.append(standardised(curvature, x + noise[0], y + noise[1], given))
-    squares = np.mean(np.square(errors), axis=0)
+    The drawn rods are smoother than the prior, so that errors may be half as large as stated."""
+    squares = squares_of_drawn_rods(np.random.default_rng(9), 60, 40, scatter, given)
     assert (squares > 0.2).all()
-    assert (squares < chi2.isf(1e-6, count) / count).all()
+    assert (squares < chi2.isf(1e-6, 60) / 60).all()
 
 
 @pytest.mark.parametrize("name", CURVATURES)
@@ -89,9 +95,9 @@ def test_deviations_of_each_rod_hold(name):
     x, y = points_of(CURVATURES[name], s)
     errors, found = [], []
     for _ in range(count):
-        noise = rng.normal(0.0, scatter, (2, s.size))
-        errors.append(standardised(CURVATURES[name], x + noise[0], y + noise[1]))
-        found.append(traced_rod(x + noise[0], y + noise[1]).scatter)
+        traced = noisy(x, y, scatter, rng)
+        errors.append(standardised(CURVATURES[name], *traced))
+        found.append(traced_rod(*traced).scatter)
     squares = np.mean(np.square(errors), axis=0)
     assert (squares < chi2.isf(1e-6, count) / count).all()
     assert (squares > 0.1).all()
@@ -105,9 +111,7 @@ def test_a_bend_near_the_tip_leaves_the_rest_straight():
     def bend(s):
         return 2.0 + 2.0 * np.tanh((s - 0.65) / 0.1)
 
-    x, y = points_of(bend, np.linspace(0.0, 1.0, 60))
-    noise = rng.normal(0.0, 0.05, (2, x.size))
-    rod = traced_rod(x + noise[0], y + noise[1])
+    rod = traced_rod(*noisy(*points_of(bend, np.linspace(0.0, 1.0, 60)), 0.05, rng))
     assert np.abs(rod.rest_curvature([0.0, 0.1, 0.3])).max() < 0.3
     assert abs(rod.rest_curvature(1.0) - 4.0) < 4.0 * rod.deviation(1.0)
 
@@ -161,15 +165,8 @@ def test_points_of_no_rod_are_refused(x, y, options, named):
 
 def test_few_points_of_known_scatter_need_no_terms_for_it():
     """The strength of the noise is not sought where the points alone could not tell it from scatter."""
-    s = np.linspace(0.0, 1.0, 8)
-    rng = np.random.default_rng(3)
-    errors = []
-    for _ in range(40):
-        curvature = drawn_curvature(rng)
-        x, y = points_of(curvature, s)
-        noise = rng.normal(0.0, 0.4, (2, s.size))
-        errors.append(standardised(curvature, x + noise[0], y + noise[1], 0.4))
-    assert (np.mean(np.square(errors), axis=0) < chi2.isf(1e-6, 40) / 40).all()
+    squares = squares_of_drawn_rods(np.random.default_rng(3), 40, 8, 0.4, 0.4)
+    assert (squares < chi2.isf(1e-6, 40) / 40).all()
 
 
 def test_curvature_does_not_follow_the_scatter():
@@ -194,8 +191,7 @@ def test_a_rod_may_go_on_beyond_its_points(name, given):
     at = np.array([0.2, 0.6, 0.95, 1.0])
     errors, short = [], []
     for _ in range(count):
-        noise = rng.normal(0.0, scatter, (2, s.size))
-        points = x + noise[0], y + noise[1]
+        points = noisy(x, y, scatter, rng)
         rod = traced_rod(*points, scatter=scatter if given else None, length=80.0)
         assert rod.length == 80.0
         errors.append((rod.rest_curvature(at) - CURVATURES[name](at)) / rod.deviation(at))

@@ -114,9 +114,8 @@ def next_length(here: Here, step: LegStep, pace: float, work: LegSeries) -> floa
 
 @inlined
 def _trial(here: Here, setting: Setting, length: float, known: float, work: LegSeries) -> LegStep:
-    """Leg of at most some length, which ends at the first knot of the contour, and where the force vanishes.
-
-    `known` is as in `sample_leg`."""
+    """Leg of at most some length, which ends at the first knot of the contour, and where the force vanishes. `known` is
+    as in `sample_leg`."""
     scene, begin = here.scene, here.begin
     leg = leg_from(scene, begin, here.onward, length)
     if known == 0.0 and scene.beam.varied is not None and slides(scene.phase):

@@ -78,11 +78,9 @@ def branch_workspace(accuracy: Accuracy, order: int, samples: int, knots: int, l
 def follow_branch(
     scene: Scene, lines: Floats | None, samples: PathSamples, workspace: BranchWorkspace, found: PathResults
 ) -> bool:
-    """Follow a branch from first contact to snap-off, and write its events and what is known of its samples.
-
-    The scene has the first line of a drive that carries the base. False if a contact that sticks seems to end in a
-    fold: it hardly yields, and errors of the travel may be larger than its growth.
-    """
+    """Follow a branch from first contact to snap-off, and write its events and what is known of its samples. The scene
+    has the first line of a drive that carries the base. False if a contact that sticks seems to end in a fold: it
+    hardly yields, and errors of the travel may be larger than its growth."""
     work, event = workspace.leg, found.event
     start = beginning(scene, lines, work.accuracy.first_step)
     here, length, followed = _begin(start, found), FIRST_LENGTH, 0

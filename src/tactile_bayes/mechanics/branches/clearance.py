@@ -40,10 +40,8 @@ class _Depth(NamedTuple):
 
 @compiled
 def travel_into(outline: Outline, beam: Beam, lines: Floats, travel: float, wholly: bool) -> float:
-    """Travel, from a given one on, at which an unloaded rod lies in the object; −∞ if it does so nowhere.
-
-    Unless it is wholly looked for, this is done there and at the ends of the lines only.
-    """
+    """Travel, from a given one on, at which an unloaded rod lies in the object; −∞ if it does so nowhere. Unless it is
+    wholly looked for, this is done there and at the ends of the lines only."""
     k, deep = line_at(lines, travel), _DEEP if wholly else _DEEP_IN_FAST
     depth = _depth(outline, beam, pose_at(line_of(lines, k), travel))
     if depth > deep:

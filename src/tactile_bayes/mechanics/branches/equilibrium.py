@@ -252,11 +252,9 @@ def _on_line(
 def settle(
     scene: Scene, start: Equilibrium, origin: Equilibrium, normal: Equilibrium, level: float, settled: float
 ) -> Balance:
-    """Equilibrium where normal · (z − origin) = level for z = (p, q, f), by Newton's method from a guess.
-
-    The search ends with a step of `settled`, over the largest. The loads are corrected for it to first order; tangent
-    and rates have an error of its size. NaN where the method does not converge.
-    """
+    """Equilibrium where normal · (z − origin) = level for z = (p, q, f), by Newton's method from a guess. The search
+    ends with a step of `settled`, over the largest. The loads are corrected for it to first order; tangent and rates
+    have an error of its size. NaN where the method does not converge."""
     at = start
     if _is_astray(scene, at):
         return nowhere()
@@ -316,11 +314,9 @@ def settle_at(scene: Scene, p: float, start: Equilibrium) -> Balance:
 
 @compiled
 def unloaded(scene: Scene, start: Equilibrium, small: float) -> Balance:
-    """Equilibrium without force, by Newton's method from a guess.
-
-    If the contact sticks, its force has no direction there. Direction and tangent are extrapolated from a small force
-    and its double, with errors of the cube and the square of these, and of their rounding.
-    """
+    """Equilibrium without force, by Newton's method from a guess. If the contact sticks, its force has no direction
+    there. Direction and tangent are extrapolated from a small force and its double, with errors of the cube and the
+    square of these, and of their rounding."""
     if slides(scene.phase):
         return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)
     one = settle(scene, Equilibrium(start.p, start.q, small), NO_FORCE, BY_FORCE, small, SETTLED)

@@ -68,18 +68,12 @@ _CLOSE = 1e-3
 # Number of steps of the search for the pose in which a rod reaches farthest into an object that it hardly reaches.
 _DEEPEST = 20
 _JUMP = 0.02  # angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it
-
-
 # Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried: as
 # near as its first contact is found.
 _NOT_TURNED = 1e-3
-
-
 _HARDLY_SLIPS = 1e-5  # slip per travel whose sense errors of a table may decide, ten times these
 # Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods does.
 _SLIGHT = 1e-3
-
-
 _RIGID = 1e-9  # travel per force [L³/EI] that rounding makes of none: a contact at 0.02 L from the base gives 3e-6
 
 
@@ -253,11 +247,9 @@ def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> Approach:
 
 @compiled
 def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: bool) -> tuple[Approach, float]:
-    """First contact on a line of a drive of some way, and its travel; NaN if there is none.
-
-    The least gap between two looks is looked for where it may be less than none: if the least found is no larger than
-    its changes from look to look.
-    """
+    """First contact on a line of a drive of some way, and its travel; NaN if there is none. The least gap between two
+    looks is looked for where it may be less than none: if the least found is no larger than its changes from look to
+    look."""
     looks = max(math.ceil(_LOOKS * (line.end - line.travel) / way), _FEWEST_LOOKS)
     size = (line.end - line.travel) / looks
     before, looked = line.travel, _look(outline, beam, line, line.travel)
@@ -328,10 +320,8 @@ def _between(
 
 @compiled
 def _arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
-    """First contact of a rod that is carried along lines, the number of the line, and the travel.
-
-    A first line that ends at no travel turns the rod into the pose in which the others begin, if it touches there.
-    """
+    """First contact of a rod that is carried along lines, the number of the line, and the travel. A first line that
+    ends at no travel turns the rod into the pose in which the others begin, if it touches there."""
     least, way, first = math.inf, 0.0, int(lines[0, 7] == 0.0)
     for k in range(lines.shape[0]):
         if not math.isnan(lines[k, 7]):

@@ -118,11 +118,8 @@ def _onward(nodes: Floats) -> Floats:
 
 @compiled
 def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -> Leg:
-    """Leg from an equilibrium in the sense of a direction.
-
-    Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f; where the
-    contact sticks, in about the turn of the force.
-    """
+    """Leg from an equilibrium in the sense of a direction. Its length is measured in the way and turn of the contact on
+    the contour, in q, and in f over 1 + f; where the contact sticks, in about the turn of the force."""
     tangent, loading = begin.tangent, 1.0 + begin.at.force
     if slides(scene.phase):
         spot = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p))
@@ -141,11 +138,9 @@ def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -
 
 @compiled
 def _fastest(scene: Scene, begin: Balance) -> Equilibrium:
-    """Direction across which a contact that sticks is followed: of that coordinate which changes most.
-
-    A rod that hardly yields along itself turns the force through the cone at once, and at the edge, where the slip has
-    vanished, that begins with the square of p.
-    """
+    """Direction across which a contact that sticks is followed: of that coordinate which changes most. A rod that
+    hardly yields along itself turns the force through the cone at once, and at the edge, where the slip has vanished,
+    that begins with the square of p."""
     tangent, force = begin.tangent, begin.tangent.force / (1.0 + begin.at.force)
     if abs(tangent.q) > max(abs(tangent.p), abs(force)):
         return Equilibrium(0.0, tangent.q, 0.0)
@@ -239,11 +234,9 @@ def sample_leg(
     scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, is_released: bool, work: LegSeries
 ) -> tuple[bool, Balance, Balance]:
     """Fit the series of a leg, unless the branch does not cut all planes, and return the equilibria at its last nodes.
-
     The search at a node starts from a polynomial through the nodes before it. If the series of a longer leg in the same
     direction are at hand, of which this is the share `known` > 0, it starts from these. At the end of one that is
-    released there is no force.
-    """
+    released there is no force."""
     at_nodes, half = work.at_nodes, work.nodes.size
     usual = max(SETTLED, 0.1 * work.accuracy.last_step)
     found = _by_way(leg, begin)

@@ -53,12 +53,10 @@ class LinePath(NamedTuple):
 
 
 def lines_through(poses: Floats, length: float, *, backward: bool = False, off: float = _STRAIGHT) -> LinePath:
-    """Return the lines between consecutive poses of the base, those that continue each other put together.
-
-    Poses are positions [length] and drive angles [rad] in the laboratory frame, shape (n, 3), of which at least two
-    differ; `off` is the distance from its line [L and rad] up to which a pose lies on it. If `backward`, the sweep
-    frame is the mirror image.
-    """
+    """Return the lines between consecutive poses of the base, those that continue each other put together. Poses are
+    positions [length] and drive angles [rad] in the laboratory frame, shape (n, 3), of which at least two differ; `off`
+    is the distance from its line [L and rad] up to which a pose lies on it. If `backward`, the sweep frame is the
+    mirror image."""
     own = np.array(poses, dtype=float)
     own[:, :2] = (own[:, :2] - own[0, :2]) / length
     if backward:
@@ -87,10 +85,8 @@ def turned_in(path: LinePath) -> LinePath:
 
 
 def _corners(points: Floats, off: float) -> Index:
-    """Indices of the points between which a path is straight, by the method of Ramer, Douglas and Peucker.
-
-    A path that goes back on its line has a corner where it turns.
-    """
+    """Indices of the points between which a path is straight, by the method of Ramer, Douglas and Peucker. A path that
+    goes back on its line has a corner where it turns."""
     corners, parts = {0, len(points) - 1}, [(0, len(points) - 1)]
     while parts:
         first, last = parts.pop()

@@ -212,11 +212,9 @@ def _rolled_on(scene: Scene, at: Equilibrium) -> Scene:
 
 @compiled
 def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
-    """Where a branch goes on sliding or sticking, and False if friction allows neither.
-
-    `changes` says whether sliding or sticking has ended. Otherwise a contact that slides does so as long as friction
-    opposes the slip, and one that sticks, sticks.
-    """
+    """Where a branch goes on sliding or sticking, and False if friction allows neither. `changes` says whether sliding
+    or sticking has ended. Otherwise a contact that slides does so as long as friction opposes the slip, and one that
+    sticks, sticks."""
     scene, line, begin, before, onward, longest = here
     delta, was_sliding = scene.rig.friction_angle, slides(scene.phase)
     if delta == 0.0 or not (changes or was_sliding) or not math.isfinite(begin.at.p):
@@ -232,9 +230,7 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
     begin = balance(scene, at)[0]
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
     there = Here(scene, line, begin, before, onward, longest)
-    if (
-        was_sliding and changes
-    ):  # where the slip has vanished, the force moves from the edge of the cone to second order
+    if was_sliding and changes:  # where the slip has vanished, the force leaves the edge of the cone to second order
         return True, there
     along, sense = leg_from(scene, begin, onward, 1.0).along, math.copysign(1.0, scene.rig.friction_angle)
     if was_sliding:
@@ -245,10 +241,8 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
 @compiled
 def slid_back(here: Here) -> Here:
     """Where a contact slides back that would stick for so little travel that rounding hides it, for a rod that is as
-    good as straight does not yield to a pull along it; NaN if it does not slide back.
-
-    The force across the rod stays, to first order.
-    """
+    good as straight does not yield to a pull along it; NaN if it does not slide back. The force across the rod stays,
+    to first order."""
     scene, line, begin, _, _, longest = here
     contact, delta = contact_at(scene, begin.at), scene.rig.friction_angle
     tip = tip_touches(scene.phase)

@@ -1,9 +1,8 @@
 """One contour in the sweep frame: relative to the pivot, in rod lengths, mirrored for a backward sweep.
 
 An outline consists of two halves of families with a formula, from a common vertex, or of a table. The rod's centreline
-stays half the rod's diameter outside the object: it traces the parallel curve, which is strictly convex too. A tapered
-rod is a cone of half angle ε. Its contact is stated by the arc length s at which the normal of its surface meets the
-centreline; there the centreline is (d/2 − s tan ε) cos ε from the object, with the diameter d at the base.
+stays half the rod's diameter outside the object, or as far as the `surface` of a tapered one says: it traces a curve
+that is strictly convex too.
 """
 
 from __future__ import annotations
@@ -169,9 +168,7 @@ def _between(table: Floats, cell: int, axis: int, t: float) -> tuple[float, floa
 @compiled
 def _by_cell(table: Floats, p: float) -> tuple[float, float, float, float, float]:
     """Point, slope angle, and rates of arc length and slope angle, by Chebyshev series in the contour's own parameter.
-
-    A row holds the beginning and the end of its cell, and the coefficients of x, y and slope angle.
-    """
+    A row holds the beginning and the end of its cell, and the coefficients of x, y and slope angle."""
     first, last = 0, table.shape[0] - 1
     while first < last:
         middle = (first + last + 1) // 2
@@ -239,11 +236,8 @@ def over(outline: Outline, arclength: float, x: float, low: float, high: float) 
 
 @compiled
 def ends(outline: Outline) -> tuple[float, float]:
-    """Least and greatest parameter.
-
-    Where the outline has no end, or one so far away that rounding hides its direction, it is cut just beyond the rod's
-    reach.
-    """
+    """Least and greatest parameter. Where the outline has no end, or one so far away that rounding hides its direction,
+    it is cut just beyond the rod's reach."""
     return _end(outline, -1.0), _end(outline, 1.0)
 
 

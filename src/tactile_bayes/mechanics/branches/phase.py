@@ -113,11 +113,9 @@ def moves(phase: int, speed: float) -> tuple[Move, Move]:
 
 @compiled
 def _rolled(outline: Outline, anchor: StuckContact, p: float) -> float:
-    """Arc length at which a rod touches that has rolled on the contour from its anchor.
-
-    It grows as the contour's parallel curve on which the centreline lies, ds1 = dσ − s1 sin ε dα: by the half angle ε
-    of a cone that curve changes with the arc length, and exp(α sin ε) is the integrating factor.
-    """
+    """Arc length at which a rod touches that has rolled on the contour from its anchor. It grows as the contour's
+    parallel curve on which the centreline lies, ds1 = dσ − s1 sin ε dα: by the half angle ε of a cone that curve
+    changes with the arc length, and exp(α sin ε) is the integrating factor."""
     half, middle, narrowing = 0.5 * (p - anchor.p), 0.5 * (p + anchor.p), outline.narrowing
     if half == 0.0:
         return anchor.arclength

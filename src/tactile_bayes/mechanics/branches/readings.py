@@ -243,9 +243,8 @@ def _on_leg(samples: PathSamples, part: Followed) -> PathSamples:
 
 @compiled
 def _look_for(part: Followed, count: int, off: float) -> None:
-    """Find the positions at which the series reach the travels of samples and some more, as 4 z − 2.
-
-    Newton's method for all samples together; those for which it does not converge are solved one by one."""
+    """Find the positions at which the series reach the travels of samples and some more, as 4 z − 2. Newton's method
+    for all samples together; those for which it does not converge are solved one by one."""
     work, room, stop = part.work, part.room, part.course.stop
     wanted, twice, found = room.wanted, room.twice, room.found
     for _ in range(_MOST_STEPS):

@@ -56,9 +56,7 @@ def _is_past_end(scene: Scene, end: float, stop: float, work: LegSeries) -> bool
 @inlined
 def _second_contact(scene: Scene, ends: tuple[float, float], goes_on: bool, stop: float, work: LegSeries) -> float:
     """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
-
-    Unless the branch is exact, it is wholly looked for at the beginning and the end only.
-    """
+    Unless the branch is exact, it is wholly looked for at the beginning and the end only."""
     if scene.beam.most_curvature <= 0.0:
         return math.nan
     for k in range(1 if goes_on else 0, work.nodes.size):
@@ -76,12 +74,9 @@ def _second_contact(scene: Scene, ends: tuple[float, float], goes_on: bool, stop
 
 @inlined
 def _touches_twice(scene: Scene, at: Touch, force: float, wholly: bool, ends: tuple[float, float]) -> bool:
-    """True if a rod touches the object at another point too, between the ends of the contour.
-
-    In tangential contact the free end has its rest shape. It is in the object at once where the contour is less
-    curved than the rod, or further on, at its tip, which is looked for if all is. In tip contact it may be the loaded
-    part.
-    """
+    """True if a rod touches the object at another point too, between the ends of the contour. In tangential contact the
+    free end has its rest shape. It is in the object at once where the contour is less curved than the rod, or further
+    on, at its tip, which is looked for if all is. In tip contact it may be the loaded part."""
     outline, beam, tip, arclength, psi1 = scene.outline, scene.beam, tip_touches(scene.phase), at.arclength, at.psi1
     spot = beside(outline, at.p, arclength)
     if not tip and spot.bend <= rest_curvature(beam, arclength) * spot.speed:

@@ -40,9 +40,8 @@ def two_values(one: Floats, other: Floats, z: float) -> tuple[float, float]:
 
 @compiled
 def at_all(rows: Floats, twice: Floats, count: int, now: Floats, before: Floats, out: Floats) -> None:
-    """Write the values of series, one in each row, at many z, given as 4 z − 2.
-
-    `now` and `before` hold the Chebyshev polynomials of all z; `out` has at least the shape (rows, count)."""
+    """Write the values of series, one in each row, at many z, given as 4 z − 2. `now` and `before` hold the Chebyshev
+    polynomials of all z; `out` has at least the shape (rows, count)."""
     for j in range(count):
         before[j], now[j] = 1.0, 0.5 * twice[j]
     for c in range(rows.shape[0]):
@@ -79,9 +78,7 @@ def crossing(
     function: Floats, slope: Floats, wanted: float, left: float, right: float, z: float, last_step: float
 ) -> float:
     """Point at which a series falls through a value from left to right, or, with left > right, from right to left.
-
-    Newton's method within a bracket, until a step is a given share of the bracket.
-    """
+    Newton's method within a bracket, until a step is a given share of the bracket."""
     before = abs(right - left)
     settled = last_step * before
     for _ in range(100):

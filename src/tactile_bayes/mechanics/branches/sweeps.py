@@ -39,21 +39,13 @@ if TYPE_CHECKING:
 
 # Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force.
 _SAME_ANGLE = 1e-5
-_TOUCHES, _TOO_FAR, _BEGINS_INSIDE = (
-    int(reach) for reach in (Reachability.TOUCHES, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
-)
+_TOUCHES, _TOO_FAR = int(Reachability.TOUCHES), int(Reachability.TOO_FAR)
+_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 # Accuracy with states and events to rounding.
 _EXACT = Accuracy(
-    np.full(3, np.inf),
-    resolved=1e-9,
-    sharp=np.inf,
-    halvings=12,
-    first_step=4e-16,
-    last_step=4e-16,
-    polished=True,
-    exact=True,
+    np.full(3, np.inf), 1e-9, np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True, exact=True
 )
 _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)  # accuracy with events to rounding and states from series
 # Accuracy that noise requires, beside its tolerance.
@@ -148,14 +140,6 @@ class Solutions(NamedTuple):
 
 
 _INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")
-
-
-def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
-    """Sweeps as a structured array."""
-    out = np.empty(sweeps.contour.size, dtype=_SWEEP)
-    for name, values in zip(Sweeps._fields, sweeps, strict=True):
-        out[name] = values
-    return out
 
 
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
@@ -260,11 +244,8 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 
 @compiled
 def _clear_angle(scene: Scene, lines: Floats | None, event: Any, accuracy: Accuracy) -> float:
-    """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not.
-
-    A rod that is released touches there without load, which small errors alone would decide: −∞ if it does so nowhere
-    else.
-    """
+    """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not. A rod that is
+    released touches there without load, which small errors alone would decide: −∞ if it does so nowhere else."""
     if lines is None:
         clear = clear_angle(scene.outline, scene.beam, accuracy.first_step)
         return -math.inf if event.snap_off == _RELEASE and clear < event.snap_angle + _SAME_ANGLE else clear
@@ -301,12 +282,9 @@ def _solve(
     event_states: Any,
     events: Any,
 ) -> None:
-    """Follow the path of every sweep, and write the results of its samples.
-
-    Sweeps are a structured array with fields as in `Sweeps`; loads and the last three are as in `Solutions`, but
-    structured. Room is for the lines of one sweep, `table` for that of one contour, and the finer workspace for paths
-    that the other leaves in doubt.
-    """
+    """Follow the path of every sweep, and write the results of its samples. Sweeps are a structured array with fields
+    as in `Sweeps`; loads and the last three are as in `Solutions`, but structured. Room is for the lines of one sweep,
+    `table` for that of one contour, and the finer workspace for paths that the other leaves in doubt."""
     count, knots, accuracy = shapes.knots.shape[1], workspace.knots, workspace.leg.accuracy
     for i in range(sweeps.size):
         sweep, event, c = sweeps[i], events[i], sweeps[i].contour
@@ -342,14 +320,12 @@ def solve_sweeps(
     polished: bool = True,
     asks_clearance: bool = True,
 ) -> Solutions:
-    """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples.
-
-    `shape` is the number of contours, and of rows for each. With a `profile`, rest curvature or rigidity vary along the
-    rod, the same in all sweeps except for the taper and an addition to its rest curvature; `known` are tables of it,
-    for loads with errors of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and
-    EI/L²], at least 1e-10 of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest.
-    States are exact if `polished`; otherwise they come from the series, with an error of 1e-10 of the largest.
-    """
+    """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples. `shape` is the number of
+    contours, and of rows for each. With a `profile`, rest curvature or rigidity vary along the rod, the same in all
+    sweeps except for the taper and an addition to its rest curvature; `known` are tables of it, for loads with errors
+    of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10
+    of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest. States are exact if
+    `polished`; otherwise they come from the series, with an error of 1e-10 of the largest."""
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     else:
@@ -358,7 +334,9 @@ def solve_sweeps(
         if may_stick and np.any(sweeps.friction_angle):
             accuracy = accuracy._replace(last_step=_LAST_STEP_STUCK)
     count, rows = shape
-    sweep = _as_sweeps(sweeps)
+    sweep = np.empty(sweeps.contour.size, dtype=_SWEEP)
+    for name, values in sweeps._asdict().items():
+        sweep[name] = values
     loads, all_states = np.zeros((count, rows, 3)), np.zeros((count, rows if states else 0), dtype=STATE)
     event_states = np.zeros((sweep.size, MOST_CHANGES + 1 if states else 0), dtype=STATE)
     events = np.empty(sweep.size, dtype=_EVENTS)

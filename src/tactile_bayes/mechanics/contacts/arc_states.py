@@ -49,10 +49,8 @@ NO_CONTACT = FoundContact(math.nan, math.nan, math.nan, math.nan, math.nan, math
 
 @compiled
 def _halved(s: float, c: float, d: float, x: float, y: float, gap: float) -> tuple[float, float, float]:
-    """Jacobi's functions of half the argument, for gap = y − x; s < 0 in the second half of a swing.
-
-    In this form nothing cancels where c = −d, at half a period.
-    """
+    """Jacobi's functions of half the argument, for gap = y − x; s < 0 in the second half of a swing. In this form
+    nothing cancels where c = −d, at half a period."""
     if d < 0.0:
         ratio, fall = gap / (c - d), (1.0 - d) / y
         return math.sqrt(fall / (1.0 + c)), math.sqrt(ratio * fall), s * math.sqrt(ratio / (1.0 + c))

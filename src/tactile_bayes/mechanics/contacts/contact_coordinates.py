@@ -50,23 +50,22 @@ def contact_states(
     >>> contact_states(np.array([[2.0, 0.3, 1.0, 2.0]])).place.round(4).ravel()
     array([0.1457, 0.9536, 0.8156, 1.    ])
     """
-    return _contact_states(coordinates, friction_angle, rods, 0)[0]
+    return contact_states_and_slopes(coordinates, friction_angle, rods, with_slopes=False)[0]
 
 
 def contact_states_and_slopes(
-    coordinates: Floats, friction_angle: Floats | float = 0.0, rods: Rods | ArrayLike = 0.0
+    coordinates: Floats,
+    friction_angle: Floats | float = 0.0,
+    rods: Rods | ArrayLike = 0.0,
+    *,
+    with_slopes: bool = True,
 ) -> tuple[ContactStates, ContactStateSlopes]:
-    """Contacts with given coordinates, and their derivatives by the coordinates; see `contact_states`."""
-    return _contact_states(coordinates, friction_angle, rods, len(coordinates))
-
-
-def _contact_states(
-    coordinates: Floats, friction_angle: Floats | float, rods: Rods | ArrayLike, slopes: int
-) -> tuple[ContactStates, ContactStateSlopes]:
+    """Contacts with given coordinates, and their derivatives by these, or none; see `contact_states`."""
     from tactile_bayes.mechanics.contacts.contact_map import write_contact_states
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     count = len(coordinates)
+    slopes = count if with_slopes else 0
     coordinates = np.ascontiguousarray(coordinates, dtype=float)
     delta = np.array(np.broadcast_to(friction_angle, (count,)), dtype=float)
     curvature, profile, stem = rods_of(rods, count)

@@ -16,23 +16,16 @@ from tactile_bayes.mechanics.poses.beam import Beam, Varied, WholePose, mirrored
 from tactile_bayes.mechanics.poses.pose import Pose
 
 _MEANS = 20  # steps of the arithmetic–geometric mean: more than enough
-
-
 _MOST_INTEGRATED = 1e3  # largest load f s1² of a rod that is integrated
-
-
 _NONE = Pose(math.nan, math.nan, math.nan)
-
 _NOWHERE = WholePose(_NONE, _NONE, _NONE, _NONE)
 
 
 @compiled
 def _is_first(x: float, y: float) -> bool:
-    """True if the rod is shorter than a period of the elastica, for the parameters of its functions (`jacobi`).
-
-    A pendulum that turns over has the period π/M in t, one that swings 2π/M, with the mean M of √max(x, y) and
-    √|x − y|.
-    """
+    """True if the rod is shorter than a period of the elastica, for the parameters of its functions (`jacobi`). A
+    pendulum that turns over has the period π/M in t, one that swings 2π/M, with the mean M of √max(x, y) and √|x −
+    y|."""
     whole = math.pi if x > y else 2.0 * math.pi
     a = math.sqrt(max(x, y))
     if a < whole:
@@ -54,11 +47,9 @@ def _column(bend: Pose, beta: float, growth: float, cos: float, sin: float, by: 
 
 @compiled
 def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> WholePose:
-    """Write one contact, with the coordinates in row i of z, to `by`, shape (5, 6); NaN if there is none.
-
-    Its rows are moment and force at the base, contact point, and direction β of the force; then their derivatives by
-    each coordinate.
-    """
+    """Write one contact, with the coordinates in row i of z, to `by`, shape (5, 6); NaN if there is none. Its rows are
+    moment and force at the base, contact point, and direction β of the force; then their derivatives by each
+    coordinate."""
     force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
     curvature, is_arc = beam.curvature, beam.varied is None
     half, load, is_straight = 0.5 * curvature * arclength, force * arclength * arclength, is_arc and curvature == 0.0
@@ -98,10 +89,8 @@ def moved(
     fy: float,
 ) -> tuple[float, float, float, float, float]:
     """Shift of the place and of ψ1, to first order, for changes of drive angle and loads: the derivatives of Step 2.
-
-    With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) the changes of ψ0 and of the lever
-    u = m0/f determine those of ψ1 and the arc length.
-    """
+    With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) the changes of ψ0 and of the lever u
+    = m0/f determine those of ψ1 and the arc length."""
     force = z[i, 0]
     here, by_psi1, longer, by_force = pose
     growth = (by[0, 1] * fx + by[0, 2] * fy) / (force * force)
@@ -136,10 +125,8 @@ def write_contact_states(
     by: Floats,
 ) -> None:
     """Write loads, places and volumes of contacts as in `ContactStates`, NaN where there is none, and derivatives.
-
     Coordinates as in `contact_states`, `by` as in `contact_state`; `loads_by` and `place_by` as in
-    `ContactStateSlopes`, or without rows.
-    """
+    `ContactStateSlopes`, or without rows."""
     for i in range(delta.size):
         _, by_psi1, longer, by_force = contact_state(coordinates, i, mirrored_by(curvature[i], varied, stem), by)
         for k in range(3):

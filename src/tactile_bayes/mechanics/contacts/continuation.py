@@ -133,10 +133,8 @@ def _settled(u: float, v: float, delta: float, beam: Beam, tip: bool, q: float, 
 def _continued(
     u: float, v: float, delta: float, beam: Beam, tip: bool, start: Start, room: Profile | None
 ) -> tuple[float, float]:
-    """(q, f) of a rod, continued from one of constant rest curvature; NaN where the continuation ends before.
-
-    The start may be somewhat off the contact: it is left behind at the same time.
-    """
+    """(q, f) of a rod, continued from one of constant rest curvature; NaN where the continuation ends before. The start
+    may be somewhat off the contact: it is left behind at the same time."""
     begin, q, force = start
     way = _UNIFORM if tip and beam.varied is not None else _STIFFENED
     rod = _between(beam, begin, way, room)
@@ -168,10 +166,8 @@ def _continued(
 def continued_state(
     x: float, y: float, alpha: float, delta: float, beam: Beam, tip: bool, start: Start, room: Profile | None
 ) -> ContactState:
-    """State of a contact, continued from that of another rod with the same contact; NaN where this ends.
-
-    The derivatives follow from those of the pose: with the slope of the contour the frame of the force turns.
-    """
+    """State of a contact, continued from that of another rod with the same contact; NaN where this ends. The
+    derivatives follow from those of the pose: with the slope of the contour the frame of the force turns."""
     beta = alpha + delta
     sin, cos = math.sin(beta), math.cos(beta)
     u, v = x * cos + y * sin, y * cos - x * sin

@@ -31,13 +31,11 @@ class SampleWorkspace(NamedTuple):
 
 
 @compiled
-def _miss(
-    reading: Reading, beam: Beam, whitening: Floats, i: int, z: Floats, j: int, free: Index, workspace: SampleWorkspace
-) -> float:
-    """Sum of squared deviations of a possible contact from a sample, in standard deviations; infinite if it is none."""
-    slopes, by, count = workspace.slopes, workspace.by, free.size
-    contact_state(z, j, beam, by)
-    deviation, turned = reading.angle_deviation[i], z[j, 3] - reading.drive_angle[i]
+def _miss(reading: Reading, beam: Beam, whitening: Floats, i: int, free: Index, workspace: SampleWorkspace) -> float:
+    """Sum of squared deviations of the trial from a sample, in standard deviations; infinite if it is no contact."""
+    z, slopes, by, count = workspace.trial, workspace.slopes, workspace.by, free.size
+    contact_state(z, 0, beam, by)
+    deviation, turned = reading.angle_deviation[i], z[0, 3] - reading.drive_angle[i]
     for r in range(4):
         for c in range(count + 1):
             slopes[r, c] = 0.0
@@ -74,14 +72,12 @@ def descents(
     hardness: Floats,
     workspace: SampleWorkspace,
 ) -> None:
-    """Descend by Levenberg–Marquardt steps until the gain that the next step promises is small.
-
-    `whitening` is the inverse of the root of the covariance of the loads, `who` are the samples that descend, in the
-    coordinates `free` (the drive angle last), for at most `steps`; with 0 they are evaluated where they are. `gain` is
-    relative to one plus the sum of squares, the misfit. `normal`, shape (n, k, k + 1), holds half of its second
-    derivatives in the Gauss–Newton approximation, and half of the first ones in the last column; `hardness` is the
-    damping of the diagonal.
-    """
+    """Descend by Levenberg–Marquardt steps until the gain that the next step promises is small. `whitening` is the
+    inverse of the root of the covariance of the loads, `who` are the samples that descend, in the coordinates `free`
+    (the drive angle last), for at most `steps`; with 0 they are evaluated where they are. `gain` is relative to one
+    plus the sum of squares, the misfit. `normal`, shape (n, k, k + 1), holds half of its second derivatives in the
+    Gauss–Newton approximation, and half of the first ones in the last column; `hardness` is the damping of the
+    diagonal."""
     count, inverse, slopes, trial = free.size, workspace.inverse, workspace.slopes, workspace.trial
     for j in range(who.size):
         i = who[j]
@@ -102,7 +98,7 @@ def descents(
                     promised += step * normal[i, a, count]
                     trial[0, free[a]] -= step
                 settled = promised <= gain * (1.0 + misfit[i])
-            new = _miss(reading, beam, whitening, i, trial, 0, free, workspace)
+            new = _miss(reading, beam, whitening, i, free, workspace)
             if steps == 0 or new <= misfit[i]:
                 misfit[i] = new
                 hardness[i] *= 0.1

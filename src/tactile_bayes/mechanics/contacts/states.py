@@ -68,11 +68,9 @@ def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> F
 def _zeros_along(
     profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
 ) -> tuple[FoundContact, FoundContact]:
-    """First two points without moment, for drive angle, holding moment, support reaction and friction angle.
-
-    The moment rises through zero at one of them and falls at the other, which are returned in this order. There is no
-    second one if the first lies beyond the tip.
-    """
+    """First two points without moment, for drive angle, holding moment, support reaction and friction angle. The moment
+    rises through zero at one of them and falls at the other, which are returned in this order. There is no second one
+    if the first lies beyond the tip."""
     force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
     state, rising, falling = State(phi0 - beta, -moment, 0.0, 0.0), NO_CONTACT, NO_CONTACT
     if not (0.0 < force < math.inf and math.isfinite(moment)):
@@ -102,11 +100,9 @@ def _zeros_along(
 def contact_pair(
     varied: Varied | None, beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float
 ) -> tuple[FoundContact, FoundContact]:
-    """Points of any rod that may be its contact: the moment rises through zero at the first, and falls at the second.
-
-    A contact along the rod is of the first kind, and so is that of a tip, unless it is turned beyond the normal of the
-    contour. Straight, uniform rods are past snap-off when they are bent both ways: they have the first kind only.
-    """
+    """Points of any rod that may be its contact: the moment rises through zero at the first, and falls at the second. A
+    contact along the rod is of the first kind, and so is that of a tip, unless it is turned beyond the normal of the
+    contour. Straight, uniform rods are past snap-off when they are bent both ways: they have the first kind only."""
     h = beam.stem
     if h != 0.0:
         moment -= lever_of_stem(h, phi0, fx, fy)
@@ -155,12 +151,10 @@ def _is_exact(arclength: float, turn: float) -> bool:
 def write_contacts(
     columns: Floats, curvature: Floats, varied: Varied | None, stem: float, out: Floats, pairs: Floats
 ) -> None:
-    """Write the contacts that follow from base wrenches, mirrored to forward ones, or the points that may be.
-
-    Columns are drive angle, holding moment, support reaction and friction angle, shape (n, 5). `out` takes the fields
-    of `Contact`, shape (n, 6), and `pairs` arc length and ψ1 of both points of `contact_pair`, shape (n, 2, 2); either
-    may have no rows.
-    """
+    """Write the contacts that follow from base wrenches, mirrored to forward ones, or the points that may be. Columns
+    are drive angle, holding moment, support reaction and friction angle, shape (n, 5). `out` takes the fields of
+    `Contact`, shape (n, 6), and `pairs` arc length and ψ1 of both points of `contact_pair`, shape (n, 2, 2); either may
+    have no rows."""
     for i in range(columns.shape[0]):
         beam = mirrored_by(curvature[i], varied, stem)
         pair = contact_pair(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
@@ -178,10 +172,8 @@ def write_contacts(
 def write_shapes(
     wrenches: Floats, curvature: Floats, varied: Varied | None, arclengths: Floats, x: Floats, y: Floats
 ) -> None:
-    """Write centrelines from base wrenches (drive angle, holding moment, support reaction), shape (n, points).
-
-    Without a force they have their rest shape; they are NaN where no contact makes a wrench.
-    """
+    """Write centrelines from base wrenches (drive angle, holding moment, support reaction), shape (n, points). Without
+    a force they have their rest shape; they are NaN where no contact makes a wrench."""
     for i in range(wrenches.shape[0]):
         beam = mirrored_by(curvature[i], varied, 0.0)
         phi0, moment, fx, fy = wrenches[i, 0], wrenches[i, 1], wrenches[i, 2], wrenches[i, 3]

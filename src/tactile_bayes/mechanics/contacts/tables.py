@@ -55,22 +55,15 @@ class Workspace(NamedTuple):
 
 
 def workspace() -> Workspace:
-    by_angle, by_share = np.empty((2, _TERMS))
-    row, tangential = (
-        np.empty(max(2 * _TERMS, _TANGENTIAL_TERMS[1])),
-        np.empty((_LEVELS.size - 1, _TANGENTIAL_TERMS[0])),
-    )
-    return Workspace(tangential, by_angle, by_share, row)
+    (by_angle, by_share), tangential = np.empty((2, _TERMS)), np.empty((_LEVELS.size - 1, _TANGENTIAL_TERMS[0]))
+    return Workspace(tangential, by_angle, by_share, np.empty(max(2 * _TERMS, _TANGENTIAL_TERMS[1])))
 
 
 @functools.cache
 def tables() -> Tables:
     """Tables for any friction angle up to `MOST_FRICTION`."""
-    angles, shares, levels = (
-        _in_cells(_ANGLES, _TERMS),
-        _in_cells(_SHARES, _TERMS),
-        _in_cells(_LEVELS, _TANGENTIAL_TERMS[0]),
-    )
+    angles, shares = _in_cells(_ANGLES, _TERMS), _in_cells(_SHARES, _TERMS)
+    levels = _in_cells(_LEVELS, _TANGENTIAL_TERMS[0])
     radius, tip = np.empty(angles.size), np.empty((2, angles.size, shares.size))
     _tabulate_tip(0.5 * np.pi * angles.ravel(), shares.ravel(), 0.5 * np.pi + _MARGIN + MOST_FRICTION, radius, tip)
     by_share = chebyshev.coefficients(tip.reshape(2, *angles.shape, *shares.shape))
@@ -118,10 +111,8 @@ def _tabulate_tip(angles: Floats, shares: Floats, largest: float, radius: Floats
         radius[i] = math.hypot(deficit, chord_angle)
         chi, epsilon1 = low, largest
         for j in range(shares.size - 1, -1, -1):
-            deficit, chord_angle = (
-                math.sin(angles[i]) * radius[i] * shares[j],
-                math.cos(angles[i]) * radius[i] * shares[j],
-            )
+            deficit = math.sin(angles[i]) * radius[i] * shares[j]
+            chord_angle = math.cos(angles[i]) * radius[i] * shares[j]
             chi, epsilon1, _, _, _ = tip_arc(deficit, chord_angle, chi, epsilon1)
             out[0, i, j], out[1, i, j] = chi * chi / angles[i], epsilon1 / shares[j]
 

@@ -93,10 +93,8 @@ def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, wo
 @cached
 def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArray[int8], out: Floats) -> None:
     """Write states of straight rods (fields of `ContactState`, and the arc length of tangential contact), shape (n, 9).
-
     Contacts (contact point, slope angle, friction angle) are mirrored to forward ones, shape (n, 4). A phase is stored
-    where it was `NONE`, for unknown.
-    """
+    where it was `NONE`, for unknown."""
     prepared = math.nan
     for i in range(columns.shape[0]):
         x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
@@ -126,11 +124,9 @@ def continued_wrenches(
     phase: NDArray[int8],
     out: Floats,
 ) -> None:
-    """Write states of arcs, or of a rod with a profile, as `wrenches` does, by continuation.
-
-    A fifth column is the rest curvature of an arc; with a profile −1 for the mirrored rod, else 1. The room is a
-    profile of the same shape to be written to.
-    """
+    """Write states of arcs, or of a rod with a profile, as `wrenches` does, by continuation. A fifth column is the rest
+    curvature of an arc; with a profile −1 for the mirrored rod, else 1. The room is a profile of the same shape to be
+    written to."""
     for i in range(columns.shape[0]):
         x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
         beam = mirrored_by(columns[i, 4], varied, 0.0)

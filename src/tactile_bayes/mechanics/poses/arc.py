@@ -33,10 +33,8 @@ _FLAT = 1e-6  # parameter m below which the derivative of D is that at m = 0
 
 
 def _even_rule(count: int) -> tuple[Floats, Floats]:
-    """Squares of the nodes and weights for even functions on [0, 1]: half of the Gauss–Legendre rule on [−1, 1].
-
-    The weights are computed from the nodes; those of NumPy are off by up to 1e-13.
-    """
+    """Squares of the nodes and weights for even functions on [0, 1]: half of the Gauss–Legendre rule on [−1, 1]. The
+    weights are computed from the nodes; those of NumPy are off by up to 1e-13."""
     nodes = np.polynomial.legendre.leggauss(2 * count)[0][count:]
     even = np.polynomial.legendre.legvander(nodes, 2 * count - 2)[:, ::2]
     return nodes**2, np.asarray(np.linalg.solve(even.T, np.eye(count, 1))[:, 0], dtype=np.float64)
@@ -180,11 +178,9 @@ def _long(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
 
 @compiled
 def _legendre(at: _Amplitude) -> tuple[float, float]:
-    """F and D = (F − E)/m, by one duplication for both.
-
-    F is R_F and D is R_D/3 of (cos²χ, Δ², 1)/sin²χ. The first halving takes the roots with their signs and therefore
-    holds for amplitudes beyond π/2 too; in this form it does not cancel at π.
-    """
+    """F and D = (F − E)/m, by one duplication for both. F is R_F and D is R_D/3 of (cos²χ, Δ², 1)/sin²χ. The first
+    halving takes the roots with their signs and therefore holds for amplitudes beyond π/2 too; in this form it does not
+    cancel at π."""
     d = math.sqrt(at.d2)
     falling = (1.0 - at.m) / (d - at.cos) if at.cos < 0.0 else (d + at.cos) / (at.sin * at.sin)
     inverse, rest = 0.5 / (at.half * at.half), 1.0 + d

@@ -79,10 +79,8 @@ Result = TypeVar("Result")
 def by_kind(
     function: Callable[Concatenate[Varied | None, Beam, Rest], Result],
 ) -> Callable[Concatenate[Beam, Rest], Result]:
-    """Compile a function of `beam.varied`, the beam and more as one of the beam and more.
-
-    numba leaves out what an `is None` excludes of an argument, and not of its field.
-    """
+    """Compile a function of `beam.varied`, the beam and more as one of the beam and more. numba leaves out what an `is
+    None` excludes of an argument, and not of its field."""
     part: Any = inlined(function)
 
     def of_beam(beam: Beam, *rest: Any) -> Any:
@@ -160,10 +158,8 @@ def beam_pose(
 
 @by_kind
 def tip_pose(varied: Varied | None, beam: Beam, psi1: float, force: float) -> tuple[Pose, Pose, Pose]:
-    """Pose in tip contact without a table, and its derivatives by ψ1 and the force.
-
-    A rod whose tip sticks hardly yields along itself: errors of a table would be a large share of that.
-    """
+    """Pose in tip contact without a table, and its derivatives by ψ1 and the force. A rod whose tip sticks hardly
+    yields along itself: errors of a table would be a large share of that."""
     if varied is None:
         here, by_psi1, by_force = pose_and_slopes(psi1, 1.0, force, beam.curvature, bool(1))
     else:
@@ -265,11 +261,9 @@ def chord_to(varied: Varied | None, beam: Beam, distance: float) -> Chord:
 
 @compiled
 def _chord_over_stem(varied: Varied | None, beam: Beam, distance: float) -> Chord:
-    """Chord of a rod that begins at a distance from the pivot.
-
-    For an arc let c be the chord from where it begins, at an angle w with sin w = κ0 c/2: then r² = h² + 2 h c cos w +
-    c², a quadratic equation for c². With a table c is found by Newton's method.
-    """
+    """Chord of a rod that begins at a distance from the pivot. For an arc let c be the chord from where it begins, at
+    an angle w with sin w = κ0 c/2: then r² = h² + 2 h c cos w + c², a quadratic equation for c². With a table c is
+    found by Newton's method."""
     h, curvature = beam.stem, beam.curvature
     if varied is None:
         square = (distance - h) * (distance + h)
@@ -404,10 +398,8 @@ def from_tip(varied: Varied | None, beam: Beam, psi1: float) -> March:
 
 @by_kind
 def loaded_part(varied: Varied | None, beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
-    """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
-
-    The walk goes on from the end of the part before; where there are tables, roughly.
-    """
+    """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`. The
+    walk goes on from the end of the part before; where there are tables, roughly."""
     share = part / PARTS
     if varied is None:
         here = pose(psi1, share, force, beam.curvature)

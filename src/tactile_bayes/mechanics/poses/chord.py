@@ -30,10 +30,8 @@ NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
 @compiled
 def tangential_arc(angle: float, m: float, guess: float) -> tuple[float, Arc, Arc]:
     """Amplitude χ ∈ [0, π], arc, and its derivatives by χ, for a chord at `angle` ≥ 0 to the contour's tangent.
-
     Newton's method solves for the square root of the angle, which is nearly proportional to χ. NaN where it does not
-    converge.
-    """
+    converge."""
     target, x = math.sqrt(angle), guess
     for _ in range(_MAX_STEPS):
         arc, by_chi = arc_to(x, m)
@@ -57,11 +55,9 @@ def tangential_arc(angle: float, m: float, guess: float) -> tuple[float, Arc, Ar
 
 @compiled
 def tip_arc(deficit: float, chord_angle: float, chi: float, epsilon1: float) -> tuple[float, float, Arc, Arc, Arc]:
-    """Amplitude χ ∈ [0, π], ε1 = π/2 − ψ1, arc, and its derivatives by χ and ψ1, of a rod of length one.
-
-    Its chord has the length √(1 − deficit²). `chord_angle` ∈ [0, π/2 + δ] is π/2 minus the chord's angle to the
-    direction across the force; `chi` and `epsilon1` are a first guess. NaN where Newton's method does not converge.
-    """
+    """Amplitude χ ∈ [0, π], ε1 = π/2 − ψ1, arc, and its derivatives by χ and ψ1, of a rod of length one. Its chord has
+    the length √(1 − deficit²). `chord_angle` ∈ [0, π/2 + δ] is π/2 minus the chord's angle to the direction across the
+    force; `chi` and `epsilon1` are a first guess. NaN where Newton's method does not converge."""
     x, t = chi, epsilon1
     for _ in range(_MAX_STEPS):
         arc, by_chi, by_psi1 = arc_and_slopes(x, math.sin(0.5 * t) ** 2)

@@ -125,11 +125,9 @@ NO_TABLES: Tables = (NO_TABLE, NO_TABLE)  # no tables
 
 
 def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
-    """Return the table of a profile, or `NO_TABLE` if it would need too many terms.
-
-    A grade of 1 or 2 is a fine table. It has more terms, and smaller ranges of ψ1 and of the force, the smallest for 2,
-    except that rods curved backward touch at larger ψ1: it holds rods of strong and uneven curvature, and costs more.
-    """
+    """Return the table of a profile, or `NO_TABLE` if it would need too many terms. A grade of 1 or 2 is a fine table.
+    It has more terms, and smaller ranges of ψ1 and of the force, the smallest for 2, except that rods curved backward
+    touch at larger ψ1: it holds rods of strong and uneven curvature, and costs more."""
     taper, bend, friction_angle = ((0.5 * (low + high),) * 2 for low, high in box[:3])
     middle = Box(taper, bend, friction_angle)
     table = NO_TABLE

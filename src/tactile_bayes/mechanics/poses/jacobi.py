@@ -38,10 +38,8 @@ class Jacobi(NamedTuple):
 
 
 def _power_series() -> tuple[Floats, Floats]:
-    """Coefficients of s and J, in powers of x y (rows) and x + y; those of t follow, since terms are homogeneous.
-
-    Each iteration of s'' = −(x + y) s + 2 x y s³ makes one more order exact.
-    """
+    """Coefficients of s and J, in powers of x y (rows) and x + y; those of t follow, since terms are homogeneous. Each
+    iteration of s'' = −(x + y) s + 2 x y s³ makes one more order exact."""
     rows, columns = _TERMS // 2 + 1, _TERMS
     order = np.add.outer(2 * np.arange(rows), np.arange(columns))  # n of t^(2 n + 1)
     one, total, both = (np.zeros((rows, columns)) for _ in range(3))

@@ -103,9 +103,8 @@ def _at_rest(profile: Profile, march: March, until: float, work: Floats) -> Marc
 
 @compiled
 def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> RestPoint:
-    """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
-
-    The rod is continued beyond its tip as in `contacts.states`."""
+    """First point of the rod at rest at a distance from the pivot; the farthest if there is none. The rod is continued
+    beyond its tip as in `contacts.states`."""
     beginning = State(0.0, 0.0, stem, 0.0)
     march = begin(profile, 0.0, FORWARD, beginning)
     found, farthest, at = beginning, 0.0, 0.0
@@ -137,9 +136,8 @@ def _chord(profile: Profile, arclength: float, at: State) -> RestPoint:
 def largest_bending_along(
     profile: Profile, phi0: float, moment: float, fx: float, fy: float, contact: float, work: Floats
 ) -> float:
-    """Largest change of curvature between pivot and contact, times the diameter over that at the base [1/L].
-
-    It is that of a base wrench and the arc length of its contact, to a part in a thousand."""
+    """Largest change of curvature between pivot and contact, times the diameter over that at the base [1/L]. It is that
+    of a base wrench and the arc length of its contact, to a part in a thousand."""
     force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
     march = begin(profile, 0.0, FORWARD, State(phi0 - beta, -moment, 0.0, 0.0))
     end = min(contact, 1.0)

@@ -27,11 +27,7 @@ _CACHE_LINE = 64  # bytes of a line of the processor's cache: numbers that lie i
 # Coefficients of one rod.
 _SHEET = np.dtype(
     [
-        (
-            "phases",
-            float,
-            (3, MOST_ROWS, COLUMNS),
-        ),  # tip contact, tangential contact up to the tip, and beyond it
+        ("phases", float, (3, MOST_ROWS, COLUMNS)),  # tip contact, tangential contact up to the tip, and beyond it
         ("at_rest", float, (2, 1, COLUMNS)),  # of the rod, and of its mirror image
         ("sums", float, (2, COLUMNS)),  # workspace for one pose
         ("outer", float, (4, MOST_NODES)),  # polynomials in taper, bend, friction angle and amplitudes of modes
@@ -135,10 +131,8 @@ def _sums(rows: Floats, count: int, x: float, z: float, room: Floats) -> tuple[P
 
 @compiled
 def chord_in(sheet: NDArray[np.void], mirrored: bool, reach: float, distance: float) -> Chord:
-    """Chord of a rod or its mirror image at rest, continued beyond its tip as an arc.
-
-    There its angle to the rod is exact, and the arc length good enough for a point beside the tip.
-    """
+    """Chord of a rod or its mirror image at rest, continued beyond its tip as an arc. There its angle to the rod is
+    exact, and the arc length good enough for a point beside the tip."""
     row = sheet[0].at_rest[1 if mirrored else 0, 0]
     x = 2.0 * min(distance / reach, 1.0) - 1.0
     arclength, bearing, slope, to_bearing, to_slope = 0.0, 0.0, 0.0, 0.0, 0.0

@@ -169,7 +169,6 @@ def _shift(rows: Floats, cell: int, offset: float, step: float, work: Floats, co
 @compiled
 def _along_step(work: Floats, column: int, count: int, fall: float, pace: float) -> int:
     """Write a polynomial of the share of the arc length of a step as a series in x, and return the number of its terms.
-
     That share g obeys g' = pace − fall · g, and so do its powers."""
     if count < 2 or fall == 0.0:
         return count
@@ -247,10 +246,8 @@ def series(
     remainder: float,
     slopes: Slopes | None,
 ) -> Step:
-    """Write the series of a state from a point of a cell on, over at most a length, and those of its derivatives.
-
-    These begin at the contact, where P = f u; None is left out.
-    """
+    """Write the series of a state from a point of a cell on, over at most a length, and those of its derivatives. These
+    begin at the contact, where P = f u; None is left out."""
     is_loaded = force != 0.0 or march.state.load != 0.0 or slopes is not None
     taper = profile.taper if is_loaded else 0.0  # the shape at rest does not depend on it
     step, bent, rigid, least = _expand(profile, taper, march, direction, length, work)
@@ -364,9 +361,8 @@ def advance(
     remainder: float,
     slopes: Followed,
 ) -> tuple[Step, March, Followed]:
-    """Write the series of a step toward an arc length, and return the step, its end, and the derivatives there.
-
-    The end is NaN after too many steps."""
+    """Write the series of a step toward an arc length, and return the step, its end, and the derivatives there. The end
+    is NaN after too many steps."""
     beside = march.cell if direction < 0.0 else march.cell + 1
     edge = math.inf if beside == profile.edges.size else profile.edges[beside]
     end = max(edge, until) if direction < 0.0 else min(edge, until)

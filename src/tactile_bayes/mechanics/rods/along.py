@@ -29,11 +29,8 @@ _LARGEST = 1e100  # largest number in the text of polynomials
 
 @dataclass(frozen=True)
 class Along:
-    """A property along a rod, as polynomials on cells.
-
-    They begin at the edges, from 0, the base; the last edge is the rod's length. Each has coefficients by powers of the
-    arc length from its beginning.
-    """
+    """A property along a rod, as polynomials on cells. They begin at the edges, from 0, the base; the last edge is the
+    rod's length. Each has coefficients by powers of the arc length from its beginning."""
 
     edges: tuple[float, ...]
     coefficients: tuple[tuple[float, ...], ...]

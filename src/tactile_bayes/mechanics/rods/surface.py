@@ -45,11 +45,11 @@ class Surface(NamedTuple):
         """Return the derivatives of `on_object`, shape (4, 4, ...)."""
         alpha, d, closer = place[2] - self.half_angle, self.standoff(place[3]), math.sin(self.half_angle)
         one, none, sin, cos = np.ones_like(alpha), np.zeros_like(alpha), np.sin(alpha), np.cos(alpha)
-        return np.stack(
+        return np.array(
             [
-                np.stack([one, none, -d * cos, closer * sin]),
-                np.stack([none, one, -d * sin, -closer * cos]),
-                np.stack([none, none, one, none]),
-                np.stack([none, none, none, one]),
+                [one, none, -d * cos, closer * sin],
+                [none, one, -d * sin, -closer * cos],
+                [none, none, one, none],
+                [none, none, none, one],
             ]
         )

@@ -80,10 +80,8 @@ class TracedRod:
 
     def modes(self, count: int) -> Floats:
         """Coefficients of independent deviations of the rest curvature, each its standard deviation, shape (count, n).
-
         They are the principal components of the deflections ∫ (c − s) κ0 ds at points c: these are what a force there
-        feels of the curvature, whose work is that of the moment that the force causes.
-        """
+        feels of the curvature, whose work is that of the moment that the force causes."""
         points, weights = leggauss(2 * self.coefficients.size)
         each = np.eye(self.coefficients.size)
         deflections = chebyshev.evaluate(chebyshev.integral(chebyshev.integral(each)), 0.5 * (points + 1.0)[:, None])
@@ -95,10 +93,8 @@ class TracedRod:
 
 
 def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, length: float | None = None) -> TracedRod:
-    """Return the rest curvature of a rod from points traced along it, base first; see `Rod.from_shape`.
-
-    Beyond the last point, up to a given length, the curvature continues with its trend and a deviation that grows.
-    """
+    """Return the rest curvature of a rod from points traced along it, base first; see `Rod.from_shape`. Beyond the last
+    point, up to a given length, the curvature continues with its trend and a deviation that grows."""
     columns = [check_numbers(name, values, shape=(None,)) for name, values in (("x", x), ("y", y))]
     if columns[0].size != columns[1].size or columns[0].size < _FEWEST:
         raise ParameterError(
@@ -207,16 +203,9 @@ def _refuse_backward(feet: Floats, scatter: float) -> None:
         )
 
 
-class _Guess(NamedTuple):
-    """A first guess."""
-
-    length: float
-    feet: Floats  # arc lengths of the points, over the length
-    slopes: Floats  # slopes of the rod at points of equal distance [rad]
-
-
-def _start_of(points: Floats) -> _Guess:
-    """Polynomials through the points by the length of the chain that they form."""
+def _start_of(points: Floats) -> tuple[float, Floats, Floats]:
+    """First guess of the length, the arc lengths of the points over it, and slopes at points of equal distance [rad],
+    from polynomials through the points by the length of the chain that they form."""
     chain = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
     chain /= chain[-1]
     x, y = (Chebyshev.fit(chain, column, 5, domain=[0.0, 1.0]).deriv() for column in points.T)
@@ -224,7 +213,7 @@ def _start_of(points: Floats) -> _Guess:
     arc = cumulative_trapezoid(np.hypot(x(z), y(z)), z, initial=0)
     slopes = np.unwrap(np.arctan2(y(z), x(z)))
     even = np.linspace(0.0, arc[-1], z.size)
-    return _Guess(float(arc[-1]), np.interp(chain, z, arc) / arc[-1], np.interp(even, arc, slopes))
+    return float(arc[-1]), np.interp(chain, z, arc) / arc[-1], np.interp(even, arc, slopes)
 
 
 class _Posterior(NamedTuple):
@@ -304,10 +293,8 @@ def _posterior(by: Floats, target: Floats, kernels: Sequence[Floats], scatter: f
 
 @functools.cache
 def _kernels(terms: int) -> list[Floats]:
-    """Offset, direction and Chebyshev coefficients of the curvature by white noise in orthonormal polynomials.
-
-    What level and trend leave of the curvature has a root mean square of one.
-    """
+    """Offset, direction and Chebyshev coefficients of the curvature by white noise in orthonormal polynomials. What
+    level and trend leave of the curvature has a root mean square of one."""
     fine = np.linspace(0.0, 1.0, _FINE)
     trend, found = np.vander(fine, 2), []
     for integrals in _INTEGRALS:
@@ -333,16 +320,14 @@ class _Fit(NamedTuple):
 
 
 def _fitted(given: Floats, scatter: float | None, whole: float | None = None) -> _Fit:
-    """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature.
-
-    Without the length of the whole rod it ends at the last point.
-    """
-    start = _start_of(given)
-    length = start.length if whole is None else whole
-    traced = start.length / length
-    feet = traced * start.feet
+    """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature. Without the
+    length of the whole rod it ends at the last point."""
+    own, feet, slopes = _start_of(given)
+    length = own if whole is None else whole
+    traced = own / length
+    feet = traced * feet
     terms, nodes, kernels = _TERMS, chebyshev.nodes(_TERMS), _kernels(_TERMS)
-    guess = Chebyshev.fit(np.linspace(0.0, traced, start.slopes.size), start.slopes, _FREE, domain=[0.0, 1.0])
+    guess = Chebyshev.fit(np.linspace(0.0, traced, slopes.size), slopes, _FREE, domain=[0.0, 1.0])
     offset, base, curvature = 0.0, float(guess(0.0)), np.zeros(terms)
     curvature[:_FREE] = guess.deriv().coef
     turns = chebyshev.integral(np.eye(terms))
