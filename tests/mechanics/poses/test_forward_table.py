@@ -26,9 +26,7 @@ ERROR, ERROR_OF_SLOPES = 1e-5, 1e-3
 def _poses(varied, table, delta, psi1, arclength, force, tip, out):
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, delta, varied.sheet) else 0.0
-    rod = _beam_of(
-        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), 0.0
-    )
+    rod = _beam_of(0.0, _known(varied, slenderness), 0.0)
     for i in range(psi1.size):
         for k, pose in enumerate(_beam_pose(rod, psi1[i], arclength[i], force[i], tip)):
             out[i, k, 0], out[i, k, 1], out[i, k, 2] = pose

@@ -29,7 +29,7 @@ from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLES, Tables, prepare
-from tactile_bayes.mechanics.poses.taylor import write_shape
+from tactile_bayes.mechanics.poses.taylor import CLOSE, EXACT, write_shape
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.tasks import in_parts
@@ -250,7 +250,8 @@ def _beam(
             if may_slip_back and angle > 0.0 and prepare(table, room, -angle - half_angle, other):
                 otherwise = table.slenderness
             break
-    return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
+    rod = Varied(room, varied.work, varied.remainder, varied.at_rest, own, slenderness, sign, other, otherwise)
+    return beam_of(0.0, rod, sweep.stem)
 
 
 def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
@@ -366,11 +367,12 @@ def solve_sweeps(
     lines = 0 if segments.lines is None else segments.lines.shape[1]
 
     def solve(part: slice) -> None:
+        rod = None if profile is None else profile.shaped(np.zeros(MOST_MODES))  # with arrays of its own
         workspace = branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines)
         finer = workspace.leg._replace(accuracy=accuracy._replace(resolved=_FINER))
         _solve(
             shapes,
-            varied_of(None if profile is None else profile.shaped(np.zeros(MOST_MODES))),  # with arrays of its own
+            varied_of(rod, EXACT if tolerance is None else CLOSE),
             known,
             sweep[part],
             segments,

@@ -37,8 +37,9 @@ from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
 _TERMS = 24  # terms of the series
-# Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand.
-EXACT, ROUGH = 1e-15, 1e-6
+# Size of the last terms of a slope [rad]: for rounding errors of a pose, for errors of some 1e-9, and for those with
+# which a rod is followed roughly, to a part in a thousand.
+EXACT, CLOSE, ROUGH = 1e-15, 1e-7, 1e-6
 FORWARD, BACKWARD = 1.0, -1.0  # directions: from the pivot, and from the contact
 FARTHEST = 4.0  # arc length up to which a rod is continued beyond its tip, as it is at its tip [L]
 # Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
@@ -49,6 +50,7 @@ _INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
 _RATE, _SIN, _COS, _PSI, _U, _V, _BENDING, _PSI_Q, _U_Q, _BENDING_Q = range(10)
 # Columns of a workspace: coefficients, and those of derivatives by ψ1 or arc length, and the force.
 _PSI_F, _U_F, _V_F, _BENDING_F, _CURVATURE, _RIGIDITY, _POLYNOMIAL, _POWERS = range(10, 18)
+STATES = _V + 1  # the first columns, from which states along a step follow
 
 
 def workspace() -> Floats:
