@@ -78,8 +78,8 @@ def _between(varied: Varied | None, beam: Beam, begin: float, way: float, room: 
         room.rigidity[i, 0] += 1.0 - rigid_share
     bend = bent_share * bend + left * sign * begin
     profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign, modes, shape)
-    _, work, remainder, at_rest, sheet, _, _, other_sheet, _ = varied
-    rod = Varied(profile, work, remainder, at_rest, sheet, 0.0, 1.0, other_sheet, 0.0)
+    _, work, remainder, at_rest, sheet, _, _ = varied
+    rod = Varied(profile, work, remainder, at_rest, sheet, 0.0, 1.0)
     return Beam(0.0, 1.0, math.inf, rod, 0.0)
 
 

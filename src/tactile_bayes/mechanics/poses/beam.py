@@ -42,7 +42,6 @@ from tactile_bayes.mechanics.poses.sheet import is_far, pose_in, sheet
 from tactile_bayes.mechanics.poses.taylor import (
     EXACT,
     FORWARD,
-    ROUGH,
     March,
     State,
     cell_at,
@@ -63,10 +62,9 @@ class Varied(NamedTuple):
     remainder: float  # of the series of poses: `EXACT` or `CLOSE`
     at_rest: AtRest  # of the rod that is not mirrored, with its stem
     sheet: NDArray[void]  # coefficients of its pose, from a table
-    slenderness: float  # slenderness of the table; 0 if there are no coefficients
+    # Slenderness of the table; 0 if there are no coefficients, negative while friction acts in the other sense.
+    slenderness: float
     sign: float  # sign of the rod to which these belong, and not to its mirror image
-    other_sheet: NDArray[void]
-    other_slenderness: float  # coefficients and slenderness for friction that acts in the other sense
 
 
 class Beam(NamedTuple):
@@ -106,7 +104,7 @@ def varied_of(profile: Profile | None, remainder: float = EXACT) -> Varied | Non
 
 def varied(profile: Profile, remainder: float = EXACT) -> Varied:
     """Profile with a workspace, and without coefficients of a table."""
-    return Varied(profile, workspace(), remainder, room_at_rest(profile.edges.size), sheet(), 0.0, 1.0, sheet(), 0.0)
+    return Varied(profile, workspace(), remainder, room_at_rest(profile.edges.size), sheet(), 0.0, 1.0)
 
 
 @compiled
@@ -140,19 +138,19 @@ def mirrored_beam(varied: Varied | None, beam: Beam) -> Beam:
 @compiled
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
-    profile, work, remainder, at_rest, own, slenderness, own_sign, other, other_slenderness = varied
+    profile, work, remainder, at_rest, own, slenderness, own_sign = varied
     edges, curvature, rigidity, taper, bend, _, modes, shape = profile
     turned = Profile(edges, curvature, rigidity, taper, bend, sign, modes, shape)
-    return Varied(turned, work, remainder, at_rest, own, slenderness, own_sign, other, other_slenderness)
+    return Varied(turned, work, remainder, at_rest, own, slenderness, own_sign)
 
 
 @by_kind
 def rubbed_otherwise(varied: Varied | None, beam: Beam) -> Beam:
-    """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
+    """Rod under friction of the other sense: coefficients hold for one angle of friction."""
     if varied is None:
         return beam
-    profile, work, remainder, at_rest, own, slenderness, sign, other, other_slenderness = varied
-    rubbed = Varied(profile, work, remainder, at_rest, other, other_slenderness, sign, own, slenderness)
+    profile, work, remainder, at_rest, own, slenderness, sign = varied
+    rubbed = Varied(profile, work, remainder, at_rest, own, -slenderness, sign)
     return Beam(beam.curvature, beam.reach, beam.most_curvature, rubbed, beam.stem)
 
 
@@ -167,14 +165,13 @@ def beam_pose(
 
 @by_kind
 def tip_pose(varied: Varied | None, beam: Beam, psi1: float, force: float) -> tuple[Pose, Pose, Pose]:
-    """Pose in tip contact without a table, and its derivatives by ψ1 and the force.
-
-    A rod whose tip sticks hardly yields along itself: errors of a table would be a large share of that.
-    """
+    """Pose in tip contact without a table, and its derivatives by ψ1 and the force."""
     if varied is None:
         here, by_psi1, by_force = pose_and_slopes(psi1, 1.0, force, beam.curvature, bool(1))
     else:
-        here, by_psi1, by_force = pose_along_in_phase(varied.profile, psi1, 1.0, force, bool(1), varied.work, EXACT)
+        here, by_psi1, by_force = pose_along_in_phase(
+            varied.profile, psi1, 1.0, force, bool(1), varied.work, varied.remainder
+        )
     return _on_stem(beam.stem, psi1, bool(1), here, by_psi1, by_force)
 
 
@@ -224,7 +221,9 @@ def whole_pose(varied: Varied | None, beam: Beam, psi1: float, arclength: float,
         here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, beam.curvature, True)
         longer = by_arclength(psi1, force, beam.curvature, here)
     else:
-        here, by_psi1, longer, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
+        here, by_psi1, longer, by_force = pose_along_and_slopes(
+            varied.profile, psi1, arclength, force, varied.work, varied.remainder
+        )
     if beam.stem == 0.0:
         return WholePose(here, by_psi1, longer, by_force)
     psi0, h = psi1 + here.turn, beam.stem
@@ -390,11 +389,10 @@ def from_tip(varied: Varied | None, beam: Beam, psi1: float) -> March:
 def loaded_part(varied: Varied | None, beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
     """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
 
-    The walk goes on from the end of the part before; where there are tables, roughly.
+    The walk goes on from the end of the part before.
     """
     share = part / PARTS
     if varied is None:
         here = pose(psi1, share, force, beam.curvature)
         return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
-    remainder = ROUGH if varied.slenderness > 0.0 else EXACT
-    return part_along(varied.profile, before, 1.0 - share, force, varied.work, remainder)
+    return part_along(varied.profile, before, 1.0 - share, force, varied.work, varied.remainder)

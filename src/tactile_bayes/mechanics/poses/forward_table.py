@@ -44,8 +44,7 @@ from tactile_bayes.numerics import chebyshev
 from tactile_bayes.tasks import in_parts
 
 _WORST = 1e-5  # largest error of the pose with which a table is of use
-# Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range.
-_OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7
+_OUTER = 5, 5, 7  # nodes in a taper, bend and friction angle that vary
 # Powers of the amplitudes of modes, along `ForwardTable.axes` and over the largest: up to four of the first, and two of
 # the others.
 _POWERS = np.array(
@@ -114,9 +113,7 @@ class ForwardTable(NamedTuple):
 _NONE = Terms(np.zeros((0, 4), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 
 # Table without any rod.
-NO_TABLE = ForwardTable(
-    _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, np.eye(MOST_MODES), 1.0, (0.0, 1.0), 1.0
-)
+NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, np.eye(MOST_MODES), 1.0, (0.0, 1.0), 1.0)
 Tables = tuple[ForwardTable, ForwardTable]  # tables of which the first that holds a rod serves it
 NO_TABLES: Tables = (NO_TABLE, NO_TABLE)  # no tables
 
@@ -141,9 +138,7 @@ def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
 def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     rows, below, high, most = _GRADES[grade]
     low, span = -box.friction_angle[1] - below, math.log1p(most / SCALE)
-    wide = box.friction_angle[1] - box.friction_angle[0] > _BOTH
-    counts = _OUTER_OF_BOTH if wide else _OUTER
-    shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(counts, box[:3], strict=True)]
+    shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(_OUTER, box[:3], strict=True)]
     tapers, bends, deltas = (begin + (end - begin) * z for z, (begin, end) in zip(shares, box[:3], strict=True))
     axes = _axes(profile)
     shapes = box.shape * (_SHAPES if box.shape else _SHAPES[:1]) @ axes

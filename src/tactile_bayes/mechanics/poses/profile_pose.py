@@ -68,8 +68,8 @@ def pose_along_in_phase(
 
 @compiled
 def pose_along_and_slopes(
-    profile: Profile, psi1: float, arclength: float, force: float, work: Floats
+    profile: Profile, psi1: float, arclength: float, force: float, work: Floats, remainder: float
 ) -> tuple[Pose, Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1, by the arc length, and by the force."""
-    here, by_psi1, by_force = pose_along_in_phase(profile, psi1, arclength, force, bool(1), work, EXACT)
-    return here, by_psi1, pose_along_in_phase(profile, psi1, arclength, force, bool(0), work, EXACT)[1], by_force
+    here, by_psi1, by_force = pose_along_in_phase(profile, psi1, arclength, force, bool(1), work, remainder)
+    return here, by_psi1, pose_along_in_phase(profile, psi1, arclength, force, bool(0), work, remainder)[1], by_force

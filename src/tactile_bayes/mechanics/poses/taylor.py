@@ -36,7 +36,7 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
-_TERMS = 24  # terms of the series
+_TERMS, _FEWER = 24, 18  # most terms of the series, and of those that need not be exact
 # Size of the last terms of a slope [rad]: for rounding errors of a pose, for errors of some 1e-9, and for those with
 # which a rod is followed roughly, to a part in a thousand.
 EXACT, CLOSE, ROUGH = 1e-15, 1e-7, 1e-6
@@ -260,8 +260,9 @@ def series(
     inverse, width, span = 1.0 / work[0, _RIGIDITY], step.width, step.span
     square, twice, thrice = width * width, 2.0 * step.fall, 3.0 * step.fall
     cube = square * width
+    most = _TERMS if remainder < CLOSE else _FEWER
     load, size, before = march.state.load / cube, 0.0, 0.0
-    for n in range(_TERMS):
+    for n in range(most):
         share, at_sin, at_cos, u, v = _INVERSE[n], work[n, _SIN], work[n, _COS], work[n, _U], work[n, _V]
         bending = _divided(work, rigid, inverse, n, load, _BENDING)
         rate = span * (bending + work[n, _CURVATURE] if n < bent else bending)
@@ -293,8 +294,8 @@ def series(
         if n >= least and max(size, before) <= remainder:
             return Step(length, 1.0, n + 1, width, step.fall, span)
     size = max(size, before) / remainder
-    share = min(1.0, size ** (-1.0 / (_TERMS - 1))) if size < math.inf else math.nan
-    return Step(length, share, _TERMS, width, step.fall, span)
+    share = min(1.0, size ** (-1.0 / (most - 1))) if size < math.inf else math.nan
+    return Step(length, share, most, width, step.fall, span)
 
 
 @compiled
