@@ -1,4 +1,4 @@
-"""Poses and chords from tables against integrated ones."""
+"""Poses from tables against integrated ones."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from tactile_bayes.mechanics.poses.forward_table import forward_table as tabulat
 from tactile_bayes.mechanics.rods.profile import profile_of
 from tactile_bayes.mechanics.rods.rod import Rod
 
-_beam_of, _beam_pose, _chord_to, _prepare = beam.beam_of, beam.beam_pose, beam.chord_to, forward_table.prepare
-_Varied, _mirrored_beam, _most = beam.Varied, beam.mirrored_beam, taylor.most_rest_curvature
+_beam_of, _beam_pose, _prepare, _Varied = beam.beam_of, beam.beam_pose, forward_table.prepare, beam.Varied
+_most = taylor.most_rest_curvature
 
 RODS = {name: drawn_rods()[name].profile for name in ("uniform", "half cone", "cone", "parabolic")}
 
@@ -23,31 +23,15 @@ ERROR, ERROR_OF_SLOPES = 1e-5, 1e-3
 
 
 @cached
-def _rod_of(varied, table, delta, stem):
-    """The beam, and whether the table holds it."""
-    profile = varied.profile
-    slenderness = table.slenderness if _prepare(table, profile, delta, varied.sheet) else 0.0
-    rod = _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0)
-    return _beam_of(0.0, rod, stem), slenderness > 0.0
-
-
-@cached
 def _poses(varied, table, delta, psi1, arclength, force, tip, out):
-    rod, held = _rod_of(varied, table, delta, 0.0)
+    profile, work, remainder, at_rest, sheet, _, _ = varied
+    slenderness = table.slenderness if _prepare(table, profile, delta, sheet) else 0.0
+    known = _Varied(profile, work, remainder, at_rest, sheet, slenderness, profile.sign)
+    rod = _beam_of(0.0, known, 0.0)
     for i in range(psi1.size):
         for k, pose in enumerate(_beam_pose(rod, psi1[i], arclength[i], force[i], tip)):
             out[i, k, 0], out[i, k, 1], out[i, k, 2] = pose
-    return held
-
-
-@cached
-def _chords(varied, table, stem, mirrored, distances, out):
-    rod, held = _rod_of(varied, table, 0.0, stem)
-    if mirrored:
-        rod = _mirrored_beam(rod)
-    for i in range(distances.size):
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = _chord_to(rod, distances[i])
-    return held
+    return slenderness > 0.0
 
 
 @cached
@@ -146,25 +130,6 @@ def test_beyond_its_ranges_a_pose_is_integrated():
     assert not poses(profile, table, 0.51, [0.1], [1.0], [1.0], True)[0]
     assert_integrated(profile, table, True, [[-1.1, 1.0, 1.0], [1.5, 1.0, 1.0], [0.2, 1.0, 40.0]])
     assert_integrated(profile, table, False, [[0.0, -0.01, 1.0], [0.0, 1.4, 1.0], [0.0, 0.5, 400.0]])
-
-
-@pytest.mark.parametrize("stem", [0.0, 0.2])
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("rod", ["half cone", "cone", "parabolic"])
-def test_chords_of_a_rod_at_rest(rod, mirrored, stem):
-    """Also beyond the tip, where it is continued as an arc, whose angle to the chord is exact without a stem."""
-    profile = RODS[rod]._replace(bend=0.1)
-    table = tabulated(profile, Box((profile.taper,) * 2, (-0.2, 0.2), (0.0, 0.0)))
-    distances = stem + np.array([0.01, 0.1, 0.3, 0.7, 0.9, 0.95])
-    found, exact = np.empty((2, distances.size, 4))
-    assert _chords(beam.varied(profile), table, stem, mirrored, distances, found)
-    assert not _chords(beam.varied(profile), NO_TABLE, stem, mirrored, distances, exact)
-    np.testing.assert_allclose(found, exact, atol=1e-7)
-    (beyond, exact), far = np.empty((2, 3, 4)), np.array([1.0, 1.2, 1.5])
-    _chords(beam.varied(profile), table, stem, mirrored, stem + far, beyond)
-    _chords(beam.varied(profile), NO_TABLE, stem, mirrored, stem + far, exact)
-    count = 1 if stem else 3
-    np.testing.assert_allclose(beyond[:count, 2:], exact[:count, 2:], atol=1e-6)
 
 
 def test_a_rod_that_needs_too_many_terms_has_no_table():

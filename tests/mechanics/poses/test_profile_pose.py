@@ -10,7 +10,7 @@ import pytest
 from helpers.profiled_rods import RodAlong, drawn_rods, integrated_pose
 from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.poses import pose as closed
-from tactile_bayes.mechanics.poses import profile_pose
+from tactile_bayes.mechanics.poses import profile_pose, taylor
 from tactile_bayes.mechanics.poses.taylor import workspace
 from tactile_bayes.mechanics.rods.profile import profile_of
 
@@ -30,7 +30,7 @@ def _values(profile, psi1, arclength, force, work, out):
 @cached
 def _slopes(profile, psi1, arclength, force, work, out):
     for i in range(psi1.size):
-        for k, pose in enumerate(_pose_and_slopes(profile, psi1[i], arclength[i], force[i], work)):
+        for k, pose in enumerate(_pose_and_slopes(profile, psi1[i], arclength[i], force[i], work, taylor.EXACT)):
             out[i, k, 0], out[i, k, 1], out[i, k, 2] = pose
 
 

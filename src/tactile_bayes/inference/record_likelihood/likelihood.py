@@ -73,9 +73,9 @@ def _log_density(error: Floats, noise: float, step: float) -> Floats:
 
 _UNFELT = 2e-3  # error of loads over their noise that changes the log-likelihood of 360 samples by less than 0.05
 _LEAST = 1e-10  # least tolerance of loads, over the largest load: tables are no more accurate
-# Least tolerance of loads, over the largest load, for which the pose of a rod with a profile comes from a table: its
-# errors are shares of the loads, which are large where a rod touches an object near its pivot.
-_TABULATED = 1e-6
+# Least tolerance of loads, over the largest load, for which the pose of a rod with a profile comes from a table, or a
+# shorter series: errors are shares of the loads, which are large where a rod touches an object near its pivot.
+_ROUGHLY = 1e-6
 _LENGTHS_OF_LINE = [0, 1, 3, 4]  # columns of a line that are lengths, or changes of lengths
 
 
@@ -115,7 +115,7 @@ class RecordLikelihood:
         self.noise = self.load_cell.noise
         self.segments = RecordSegments(measured, load_cell, rubs or friction > 0.0)
         self._turn = self.segments.drive_angles if frame_of(record) == "turning" else None
-        self._tables = RodTables(self.rod, friction, self.segments.has_history)
+        self._tables = RodTables(self.rod, friction)
 
     @property
     def noise(self) -> Floats:
@@ -130,7 +130,7 @@ class RecordLikelihood:
         readings = len(self.measured) if self.blocks is None else float(self.blocks.readings.sum())
         share = _UNFELT * math.sqrt(min(1.0, 360.0 / readings))
         self._tolerance = np.maximum(share * self._noise / per_load, _LEAST * largest)
-        self._tolerated_share = float((self._tolerance / largest).min())
+        self._may_be_rough = not self.exact and float((self._tolerance / largest).min()) >= _ROUGHLY
 
     def paths(
         self, contours: Contour, rig: RigValues | None = None, *, exact: bool = True, drive_angles: Floats | None = None
@@ -173,7 +173,9 @@ class RecordLikelihood:
         from tactile_bayes.mechanics.poses.forward_table import NO_TABLES  # numba takes a second to load
 
         profile = self._profile(rig)
-        if self.exact or profile is None or self._tolerated_share < _TABULATED:
+        # Where a rod may stick, sliding and sticking must not differ by the error of a table: it hardly yields along
+        # itself.
+        if profile is None or not self._may_be_rough or self.segments.has_history:
             return NO_TABLES
         return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction, rig.length)
 
@@ -233,6 +235,7 @@ class RecordLikelihood:
             profile=self._profile(rig),
             known=self._known(rig),
             tolerance=None if self.exact else self._tolerance,
+            roughly=self._may_be_rough,
             asks_clearance=not self.is_always_clear,
         )
 

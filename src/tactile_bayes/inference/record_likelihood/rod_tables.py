@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
 _SHAPES = 4.0, 3.0  # amplitudes of the modes of a traced rod: one of 150, and one of 9 draws from the prior is beyond
 _LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
-# Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where a drive
-# has a history, along which a rod may slide back.
+# Angles of friction in the two tables of a likelihood.
 _FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
 # Share of rods with friction beyond the first table up to which they are integrated: 7 % of draws from the default
 # prior, for which the second table of a traced rod would be a sixth of a start's time.
@@ -33,8 +32,8 @@ _FEW = 0.1
 class RodTables:
     """Tables of the stated rod, each made for the first rig that needs it, and kept."""
 
-    def __init__(self, rod: Rod, friction: float, may_slide_back: bool) -> None:
-        self._rod, self._friction, self._may_slide_back = rod, friction, may_slide_back
+    def __init__(self, rod: Rod, friction: float) -> None:
+        self._rod, self._friction = rod, friction
         self.made: dict[tuple[bool, ...], ForwardTable] = {}
         """Tables, or `NO_TABLE` where none is accurate enough, by whether taper, rest curvature, friction and length
         differ from what is stated, and whether friction is strong."""
@@ -47,7 +46,7 @@ class RodTables:
         is_cone = self._rod.diameter > 0.0 and bool(np.any(self._rod.taper + taper))
         varied = bool(np.any(taper)), bool(np.any(bend)), slides, is_cone and bool(np.any(length != 1.0))
         share = np.mean(np.arctan(friction) > _FRICTION_ANGLES[0][1])
-        is_strong = slides and not self._may_slide_back and bool(share > _FEW)
+        is_strong = slides and bool(share > _FEW)
         return self._table(profile, varied, False), self._table(profile, varied, True) if is_strong else NO_TABLE
 
     def _table(self, profile: Profile, varied: tuple[bool, bool, bool, bool], is_strong: bool) -> ForwardTable:
@@ -56,12 +55,11 @@ class RodTables:
         key = *varied, is_strong
         if key not in self.made:
             widths = _TAPERS if varied[0] else (0.0,), _BENDS if varied[1] else (0.0,)
-            senses = (True, False) if self._may_slide_back and (varied[2] or self._friction) else (False,)
             angle = float(np.arctan(self._friction))
             low, high = _FRICTION_ANGLES[is_strong] if varied[2] else (angle, angle)
             shapes = _SHAPES if self._rod.rest_shape_modes else (0.0,)
-            for grade, both, shape, bend, taper in product(range(GRADES), senses, shapes, *widths[::-1]):
-                box = self._box(taper, bend, (-high if both else low, high), _LENGTHS if varied[3] else (1.0, 1.0))
+            for grade, shape, bend, taper in product(range(GRADES), shapes, *widths[::-1]):
+                box = self._box(taper, bend, (low, high), _LENGTHS if varied[3] else (1.0, 1.0))
                 self.made[key] = forward_table(profile, box._replace(shape=shape), grade)
                 if self.made[key] is not NO_TABLE:
                     break

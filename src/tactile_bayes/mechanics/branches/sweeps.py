@@ -29,7 +29,7 @@ from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLES, Tables, prepare
-from tactile_bayes.mechanics.poses.taylor import write_shape
+from tactile_bayes.mechanics.poses.taylor import CLOSE, EXACT, write_shape
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.tasks import in_parts
@@ -201,7 +201,7 @@ def _scene(
     force = moment / sweep.relative_length
     rig = RigParameters(sweep.friction_angle, sweep.compliance, sweep.yielding, offset, sign, moment, force)
     outline = _outline(shapes, sweep, table)
-    beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
+    beam = _beam(varied, known, sweep, sign, outline.half_angle)
     return Scene(outline, beam, rig, line, TIP, NOWHERE)
 
 
@@ -217,24 +217,20 @@ def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
 
 
 @compiled
-def _beam(
-    varied: Varied | None, known: Tables, sweep: Any, sign: float, half_angle: float, may_slip_back: bool
-) -> Beam:
-    """Rod of a sweep, with coefficients for its friction, and for friction of the other sense if that may act."""
+def _beam(varied: Varied | None, known: Tables, sweep: Any, sign: float, half_angle: float) -> Beam:
+    """Rod of a sweep, with coefficients for its friction, if a table holds it."""
     if varied is None:
         return beam_of(sign * sweep.rest_curvature, varied, sweep.stem)
     edges, curvature, rigidity, _, bend, _, modes, shape = varied.profile
     write_shape(modes, sweep.rest_shape, shape, curvature)
     room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign, modes, shape)
-    angle, own, other = sweep.friction_angle, varied.sheet, varied.other_sheet
-    slenderness, otherwise = 0.0, 0.0
+    slenderness = 0.0
     for table in known:
-        if prepare(table, room, angle - half_angle, own):
+        if prepare(table, room, sweep.friction_angle - half_angle, varied.sheet):
             slenderness = table.slenderness
-            if may_slip_back and angle > 0.0 and prepare(table, room, -angle - half_angle, other):
-                otherwise = table.slenderness
             break
-    return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
+    rod = Varied(room, varied.work, varied.remainder, varied.at_rest, varied.sheet, slenderness, sign)
+    return beam_of(0.0, rod, sweep.stem)
 
 
 def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
@@ -316,16 +312,20 @@ def solve_sweeps(
     profile: Profile | None = None,
     known: Tables = NO_TABLES,
     tolerance: Floats | None = None,
+    roughly: bool = False,
     states: bool = False,
     polished: bool = True,
     asks_clearance: bool = True,
 ) -> Solutions:
-    """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples. `shape` is the number of
-    contours, and of rows for each. With a `profile`, rest curvature or rigidity vary along the rod, the same in all
-    sweeps except for the taper and an addition to its rest curvature; `known` are tables of it, for loads with errors
-    of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10
-    of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest. States are exact if
-    `polished`; otherwise they come from the series, with an error of 1e-10 of the largest."""
+    """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples.
+
+    `shape` is the number of contours, and of rows for each. With a `profile`, rest curvature or rigidity vary along the
+    rod, the same in all sweeps except for the taper and an addition to its rest curvature; `known` are tables of it,
+    for loads with errors of some 1e-6 of the largest, and `roughly` allows these without a table too. `tolerance` are
+    tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10 of the loads; without it events are exact,
+    and loads have errors of some 1e-8 of the largest. States are exact if `polished`; otherwise they come from the
+    series, with an error of 1e-10 of the largest.
+    """
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     else:
@@ -344,11 +344,12 @@ def solve_sweeps(
     lines = 0 if segments.lines is None else segments.lines.shape[1]
 
     def solve(part: slice) -> None:
+        rod = None if profile is None else profile.shaped(np.zeros(MOST_MODES))  # with arrays of its own
         workspace = branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines)
         finer = workspace.leg._replace(accuracy=accuracy._replace(resolved=_FINER))
         _solve(
             shapes,
-            varied_of(None if profile is None else profile.shaped(np.zeros(MOST_MODES))),  # with arrays of its own
+            varied_of(rod, CLOSE if roughly else EXACT),
             known,
             sweep[part],
             segments,

@@ -67,7 +67,7 @@ def _between(varied: Varied | None, beam: Beam, begin: float, way: float, room: 
     """Rod on the way of a continuation that begins with a rest curvature; its profile is written to the room."""
     left = min(_WHOLE - way, 1.0)
     if varied is None or room is None:
-        return Beam(beam.curvature - left * (beam.curvature - begin), 1.0, math.inf, varied, 0.0, 1.0)
+        return Beam(beam.curvature - left * (beam.curvature - begin), 1.0, math.inf, varied, 0.0)
     edges, bent, rigidity, taper, bend, sign, modes, shape = varied.profile
     bent_share, rigid_share = 1.0 - left, min(way, 1.0)
     for i in range(edges.size):
@@ -78,8 +78,9 @@ def _between(varied: Varied | None, beam: Beam, begin: float, way: float, room: 
         room.rigidity[i, 0] += 1.0 - rigid_share
     bend = bent_share * bend + left * sign * begin
     profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign, modes, shape)
-    varied = Varied(profile, varied.work, varied.sheet, 0.0, 1.0, varied.other_sheet, 0.0)
-    return Beam(0.0, 1.0, math.inf, varied, 0.0, 1.0)
+    _, work, remainder, at_rest, sheet, _, _ = varied
+    rod = Varied(profile, work, remainder, at_rest, sheet, 0.0, 1.0)
+    return Beam(0.0, 1.0, math.inf, rod, 0.0)
 
 
 class _Slopes(NamedTuple):

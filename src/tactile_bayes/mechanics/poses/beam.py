@@ -29,12 +29,19 @@ from tactile_bayes.mechanics.poses.profile_pose import (
     pose_along_and_slopes,
     pose_along_in_phase,
 )
-from tactile_bayes.mechanics.poses.profile_shape import beyond_along, chord_along, largest_bending_along, rest_along
-from tactile_bayes.mechanics.poses.sheet import chord_in, is_far, pose_in, sheet
+from tactile_bayes.mechanics.poses.profile_shape import (
+    AtRest,
+    beyond_along,
+    chord_at_rest,
+    largest_bending_along,
+    rest_along,
+    room_at_rest,
+    write_at_rest,
+)
+from tactile_bayes.mechanics.poses.sheet import is_far, pose_in, sheet
 from tactile_bayes.mechanics.poses.taylor import (
     EXACT,
     FORWARD,
-    ROUGH,
     March,
     State,
     cell_at,
@@ -45,7 +52,6 @@ from tactile_bayes.mechanics.poses.taylor import (
 from tactile_bayes.mechanics.rods.profile import Profile
 
 PARTS = 8  # number of parts of a rod between which a second contact is sought in `loaded_part`
-_MOST_STEPS, _SETTLED = 20, 1e-10  # largest number of Newton steps to a distance from the pivot, and the last one [L]
 
 
 class Varied(NamedTuple):
@@ -53,12 +59,12 @@ class Varied(NamedTuple):
 
     profile: Profile
     work: Floats
+    remainder: float  # of the series of poses: `EXACT` or `CLOSE`
+    at_rest: AtRest  # of the rod that is not mirrored, with its stem
     sheet: NDArray[void]  # coefficients of its pose, from a table
-    slenderness: float  # slenderness of the table; 0 if there are no coefficients
-    # Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose.
-    sign: float
-    other_sheet: NDArray[void]
-    other_slenderness: float  # coefficients and slenderness for friction that acts in the other sense
+    # Slenderness of the table; 0 if there are no coefficients, negative while friction acts in the other sense.
+    slenderness: float
+    sign: float  # sign of the rod to which these belong, and not to its mirror image
 
 
 class Beam(NamedTuple):
@@ -69,7 +75,6 @@ class Beam(NamedTuple):
     most_curvature: float  # upper bound of the rest curvature [1/L]
     varied: Varied | None  # properties along the rod; None for uniform rods of constant rest curvature
     stem: float  # length of the rigid piece between pivot and rod [L]
-    own_reach: float  # distance from where the rod begins to its tip at rest [L], for tables
 
 
 Rest = ParamSpec("Rest")
@@ -90,22 +95,22 @@ def by_kind(
     return made
 
 
-def varied_of(profile: Profile | None) -> Varied | None:
+def varied_of(profile: Profile | None, remainder: float = EXACT) -> Varied | None:
     """Profile with a workspace, if there is one."""
-    return None if profile is None else varied(profile)
+    return None if profile is None else varied(profile, remainder)
 
 
-def varied(profile: Profile) -> Varied:
+def varied(profile: Profile, remainder: float = EXACT) -> Varied:
     """Profile with a workspace, and without coefficients of a table."""
-    return Varied(profile, workspace(), sheet(), 0.0, 1.0, sheet(), 0.0)
+    return Varied(profile, workspace(), remainder, room_at_rest(profile.edges.size), sheet(), 0.0, 1.0)
 
 
 @compiled
 def mirrored_by(curvature: float, varied: Varied | None, stem: float) -> Beam:
     """Rod of a contact, as in `Rods`."""
     if varied is None:
-        return Beam(curvature, 1.0, curvature, varied, stem, 1.0)
-    return Beam(0.0, 1.0, math.inf, with_sign(varied, curvature), stem, 1.0)
+        return Beam(curvature, 1.0, curvature, varied, stem)
+    return Beam(0.0, 1.0, math.inf, with_sign(varied, curvature), stem)
 
 
 @compiled
@@ -113,38 +118,38 @@ def beam_of(curvature: float, varied: Varied | None, stem: float) -> Beam:
     """Uniform rod whose rest shape is an arc of length one, or a rod whose properties vary along it, on a stem."""
     if varied is None:
         along, across = end_of_arc(curvature, 1.0)
-        return Beam(curvature, math.hypot(stem + along, across), curvature, varied, stem, math.hypot(along, across))
-    own = rest_along(varied.profile, 0.0, 1.0, varied.work).distance
-    reach = own if stem == 0.0 else rest_along(varied.profile, stem, 1.0, varied.work).distance
-    return Beam(0.0, reach, most_rest_curvature(varied.profile), varied, stem, own)
+        return Beam(curvature, math.hypot(stem + along, across), curvature, varied, stem)
+    write_at_rest(with_sign(varied, 1.0).profile, stem, varied.work, varied.at_rest)
+    reach = rest_along(varied.profile, stem, 1.0, varied.work).distance
+    return Beam(0.0, reach, most_rest_curvature(varied.profile), varied, stem)
 
 
 @by_kind
 def mirrored_beam(varied: Varied | None, beam: Beam) -> Beam:
     """Rod in the frame of the opposite sweep."""
     if varied is None:
-        return Beam(-beam.curvature, beam.reach, math.inf, varied, beam.stem, beam.own_reach)
+        return Beam(-beam.curvature, beam.reach, math.inf, varied, beam.stem)
     turned = with_sign(varied, -varied.profile.sign)
-    return Beam(0.0, beam.reach, math.inf, turned, beam.stem, beam.own_reach)
+    return Beam(0.0, beam.reach, math.inf, turned, beam.stem)
 
 
 @compiled
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
-    profile, work, own, slenderness, own_sign, other, other_slenderness = varied
+    profile, work, remainder, at_rest, own, slenderness, own_sign = varied
     edges, curvature, rigidity, taper, bend, _, modes, shape = profile
     turned = Profile(edges, curvature, rigidity, taper, bend, sign, modes, shape)
-    return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness)
+    return Varied(turned, work, remainder, at_rest, own, slenderness, own_sign)
 
 
 @by_kind
 def rubbed_otherwise(varied: Varied | None, beam: Beam) -> Beam:
-    """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
+    """Rod under friction of the other sense: coefficients hold for one angle of friction."""
     if varied is None:
         return beam
-    profile, work, own, slenderness, sign, other, other_slenderness = varied
-    rubbed = Varied(profile, work, other, other_slenderness, sign, own, slenderness)
-    return Beam(beam.curvature, beam.reach, beam.most_curvature, rubbed, beam.stem, beam.own_reach)
+    profile, work, remainder, at_rest, own, slenderness, sign = varied
+    rubbed = Varied(profile, work, remainder, at_rest, own, -slenderness, sign)
+    return Beam(beam.curvature, beam.reach, beam.most_curvature, rubbed, beam.stem)
 
 
 @by_kind
@@ -158,12 +163,13 @@ def beam_pose(
 
 @by_kind
 def tip_pose(varied: Varied | None, beam: Beam, psi1: float, force: float) -> tuple[Pose, Pose, Pose]:
-    """Pose in tip contact without a table, and its derivatives by ψ1 and the force. A rod whose tip sticks hardly
-    yields along itself: errors of a table would be a large share of that."""
+    """Pose in tip contact without a table, and its derivatives by ψ1 and the force."""
     if varied is None:
         here, by_psi1, by_force = pose_and_slopes(psi1, 1.0, force, beam.curvature, bool(1))
     else:
-        here, by_psi1, by_force = pose_along_in_phase(varied.profile, psi1, 1.0, force, bool(1), varied.work)
+        here, by_psi1, by_force = pose_along_in_phase(
+            varied.profile, psi1, 1.0, force, bool(1), varied.work, varied.remainder
+        )
     return _on_stem(beam.stem, psi1, bool(1), here, by_psi1, by_force)
 
 
@@ -194,7 +200,7 @@ def _pose(
         )
         if inside:
             return here, by_q, by_force
-    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
+    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work, varied.remainder)
 
 
 class WholePose(NamedTuple):
@@ -213,7 +219,9 @@ def whole_pose(varied: Varied | None, beam: Beam, psi1: float, arclength: float,
         here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, beam.curvature, True)
         longer = by_arclength(psi1, force, beam.curvature, here)
     else:
-        here, by_psi1, longer, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
+        here, by_psi1, longer, by_force = pose_along_and_slopes(
+            varied.profile, psi1, arclength, force, varied.work, varied.remainder
+        )
     if beam.stem == 0.0:
         return WholePose(here, by_psi1, longer, by_force)
     psi0, h = psi1 + here.turn, beam.stem
@@ -254,42 +262,35 @@ def is_far_from_table(varied: Varied | None, beam: Beam, arclength: float, force
 @by_kind
 def chord_to(varied: Varied | None, beam: Beam, distance: float) -> Chord:
     """Chord of the rod at rest to its first point at a distance from the pivot."""
+    if varied is not None:
+        found = chord_at_rest(varied.profile, beam.stem, distance, varied.at_rest, varied.work)
+        return _to_chord(found.arclength, found.bearing, found.slope, found.curvature, distance)
     if beam.stem == 0.0:
-        return _chord(varied, beam, distance)
-    return _chord_over_stem(varied, beam, distance)
+        return _chord(beam.curvature, distance)
+    return _chord_over_stem(beam, distance)
+
+
+@inlined
+def _chord(curvature: float, distance: float) -> Chord:
+    """Chord of an arc."""
+    sine = min(max(0.5 * curvature * distance, -1.0), 1.0)
+    angle, cos = math.asin(sine), math.sqrt((1.0 - sine) * (1.0 + sine))
+    arclength = distance if curvature == 0.0 else 2.0 * angle / curvature
+    return Chord(arclength, angle, angle, 0.5 * curvature / cos if cos > ACROSS else 0.0)
 
 
 @compiled
-def _chord_over_stem(varied: Varied | None, beam: Beam, distance: float) -> Chord:
-    """Chord of a rod that begins at a distance from the pivot. For an arc let c be the chord from where it begins, at
-    an angle w with sin w = κ0 c/2: then r² = h² + 2 h c cos w + c², a quadratic equation for c². With a table c is
-    found by Newton's method."""
+def _chord_over_stem(beam: Beam, distance: float) -> Chord:
+    """Chord of an arc that begins at a distance from the pivot.
+
+    Let c be the chord from where it begins, at an angle w with sin w = κ0 c/2: then r² = h² + 2 h c cos w + c², a
+    quadratic equation for c².
+    """
     h, curvature = beam.stem, beam.curvature
-    if varied is None:
-        square = (distance - h) * (distance + h)
-        root = math.sqrt(max(4.0 * distance * distance - curvature * curvature * square * square, 0.0))
-        c = square / math.sqrt(square + h * (2.0 * h + root))
-        return _over_stem(h, c, _chord(varied, beam, c), curvature, distance)
-    if varied.slenderness > 0.0:
-        c = max(distance - h, 0.0)
-        own = _chord(varied, beam, c)
-        for _ in range(_MOST_STEPS):
-            cos, sin = math.cos(own.at_base), math.sin(own.at_base)
-            rate = (c + h * cos - h * sin * math.tan(own.at_point)) / distance
-            step = (math.hypot(h + c * cos, c * sin) - distance) / rate
-            c = max(c - step, 0.0)
-            own = _chord(varied, beam, c)
-            if not abs(step) > _SETTLED:
-                break
-        bent = own.rate * math.cos(own.at_point)
-        return _over_stem(h, c, own, bent + (math.sin(own.at_point) / c if c > 0.0 else 0.0), distance)
-    found = chord_along(varied.profile, h, distance, varied.work)
-    return _to_chord(found.arclength, found.bearing, found.slope, found.curvature, distance)
-
-
-@compiled
-def _over_stem(h: float, c: float, own: Chord, curvature: float, distance: float) -> Chord:
-    """Chord from the pivot, from that of length c from where the rod begins, and the curvature at its end."""
+    square = (distance - h) * (distance + h)
+    root = math.sqrt(max(4.0 * distance * distance - curvature * curvature * square * square, 0.0))
+    c = square / math.sqrt(square + h * (2.0 * h + root))
+    own = _chord(curvature, c)
     bearing = math.atan2(c * math.sin(own.at_base), h + c * math.cos(own.at_base))
     return _to_chord(own.arclength, bearing, own.at_base + own.at_point, curvature, distance)
 
@@ -301,20 +302,6 @@ def _to_chord(arclength: float, bearing: float, slope: float, curvature: float, 
     cos = math.cos(at_point)
     rate = (curvature - math.sin(at_point) / distance) / cos if cos > ACROSS else 0.0
     return Chord(arclength, bearing, at_point, rate)
-
-
-@inlined
-def _chord(varied: Varied | None, beam: Beam, distance: float) -> Chord:
-    if varied is None:
-        curvature = beam.curvature
-        sine = min(max(0.5 * curvature * distance, -1.0), 1.0)
-        angle, cos = math.asin(sine), math.sqrt((1.0 - sine) * (1.0 + sine))
-        arclength = distance if curvature == 0.0 else 2.0 * angle / curvature
-        return Chord(arclength, angle, angle, 0.5 * curvature / cos if cos > ACROSS else 0.0)
-    if varied.slenderness > 0.0:
-        return chord_in(varied.sheet, varied.sign != varied.profile.sign, beam.own_reach, distance)
-    found = chord_along(varied.profile, 0.0, distance, varied.work)
-    return _to_chord(found.arclength, found.bearing, found.slope, found.curvature, distance)
 
 
 @by_kind
@@ -398,11 +385,12 @@ def from_tip(varied: Varied | None, beam: Beam, psi1: float) -> March:
 
 @by_kind
 def loaded_part(varied: Varied | None, beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
-    """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`. The
-    walk goes on from the end of the part before; where there are tables, roughly."""
+    """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
+
+    The walk goes on from the end of the part before.
+    """
     share = part / PARTS
     if varied is None:
         here = pose(psi1, share, force, beam.curvature)
         return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
-    remainder = ROUGH if varied.slenderness > 0.0 else EXACT
-    return part_along(varied.profile, before, 1.0 - share, force, varied.work, remainder)
+    return part_along(varied.profile, before, 1.0 - share, force, varied.work, varied.remainder)

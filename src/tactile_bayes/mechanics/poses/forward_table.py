@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.poses.profile_pose import pose_along
-from tactile_bayes.mechanics.poses.profile_shape import chord_along, rest_along
 from tactile_bayes.mechanics.poses.sheet import (
     BEYOND,
     COLUMNS,
@@ -35,7 +34,6 @@ from tactile_bayes.mechanics.poses.sheet import (
     MOST_ROWS,
     SCALE,
     TERMS,
-    chord_in,
     length_of,
     pose_in,
     sheet,
@@ -46,8 +44,7 @@ from tactile_bayes.numerics import chebyshev
 from tactile_bayes.tasks import in_parts
 
 _WORST = 1e-5  # largest error of the pose with which a table is of use
-# Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range.
-_OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7
+_OUTER = 5, 5, 7  # nodes in a taper, bend and friction angle that vary
 # Powers of the amplitudes of modes, along `ForwardTable.axes` and over the largest: up to four of the first, and two of
 # the others.
 _POWERS = np.array(
@@ -104,7 +101,6 @@ class ForwardTable(NamedTuple):
     tip: Terms  # tip contact
     tangential: Terms  # tangential contact up to the tip
     beyond: Terms  # tangential contact beyond it
-    chord: Terms  # arc length, bearing and slope of the rod at rest at a distance, in one row
     box: Floats  # least and largest taper, bend and friction angle, shape (3, 2)
     shape: float  # largest amplitudes of modes, as in `Box`
     # Axes of the amplitudes, along which a rod seen from its tip turns most, second most, …: shape (modes, modes).
@@ -117,9 +113,7 @@ class ForwardTable(NamedTuple):
 _NONE = Terms(np.zeros((0, 4), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 
 # Table without any rod.
-NO_TABLE = ForwardTable(
-    _NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, np.eye(MOST_MODES), 1.0, (0.0, 1.0), 1.0
-)
+NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, np.eye(MOST_MODES), 1.0, (0.0, 1.0), 1.0)
 Tables = tuple[ForwardTable, ForwardTable]  # tables of which the first that holds a rod serves it
 NO_TABLES: Tables = (NO_TABLE, NO_TABLE)  # no tables
 
@@ -142,9 +136,7 @@ def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
 def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     rows, below, high, most = _GRADES[grade]
     low, span = -box.friction_angle[1] - below, math.log1p(most / SCALE)
-    wide = box.friction_angle[1] - box.friction_angle[0] > _BOTH
-    counts = _OUTER_OF_BOTH if wide else _OUTER
-    shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(counts, box[:3], strict=True)]
+    shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(_OUTER, box[:3], strict=True)]
     tapers, bends, deltas = (begin + (end - begin) * z for z, (begin, end) in zip(shares, box[:3], strict=True))
     axes = _axes(profile)
     shapes = box.shape * (_SHAPES if box.shape else _SHAPES[:1]) @ axes
@@ -153,7 +145,6 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     ways, loading = chebyshev.nodes(rows), np.concatenate([[0.0], chebyshev.nodes(TERMS - 1)])
     forces = SCALE * np.expm1(span * loading)
     tip, tangential = np.empty((2, *outer[:3], rows, TERMS, 3)), np.empty((2, *outer, 2, rows, TERMS, 3))
-    chord, distances = np.empty((2, *outer[1:3], 3, TERMS)), chebyshev.nodes(TERMS)
     psi1 = low + (high - low) * ways
     rods = list(product(enumerate((1.0, -1.0)), enumerate(bends), enumerate(shapes), enumerate(tapers)))
 
@@ -161,9 +152,8 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
         work = workspace()
         for (i, sign), (b, bend), (c, shape), (a, taper) in rods[part]:
             rod = profile.shaped(shape)._replace(taper=taper, bend=bend, sign=sign)
-            # The rod at rest does not depend on the taper.
-            known = psi1, ways, deltas, forces, slenderness, distances[: 0 if a else TERMS]
-            _write_rod(rod, *known, work, tip[i, a, b, c], tangential[i, a, b, c], chord[i, b, c])
+            known = psi1, ways, deltas, forces, slenderness
+            _write_rod(rod, *known, work, tip[i, a, b, c], tangential[i, a, b, c])
 
     in_parts(write, len(rods), 1)
     felt = np.where(forces > 0.0, forces < _THRUST, _AT_ONSET)[:, None]
@@ -171,7 +161,6 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
         _phase(tip[:, :, :, :, None], felt, loading),
         _phase(tangential[..., 0, :, :, :], felt, loading),
         _phase(tangential[..., 1, :, :, :], felt, loading),
-        _terms(chord[:, None, :, :, None, None], _AT_ONSET, (-1, distances)),
         np.array(box[:3], dtype=float),
         box.shape,
         axes,
@@ -237,24 +226,17 @@ def _write_rod(
     deltas: Floats,
     forces: Floats,
     slenderness: float,
-    distances: Floats,
     work: Floats,
     tip: Floats,
     tangential: Floats,
-    chord: Floats,
 ) -> None:
-    """Write the poses of a rod in tip contact, in tangential contact up to the tip and beyond it, and its shape at
-    rest."""
+    """Write the poses of a rod in tip contact, and in tangential contact up to the tip and beyond it."""
     for i in range(ways.size):
         _write_row(rod, psi1[i], 1.0, forces, slenderness, work, tip[i])
         for d in range(deltas.size):
             for k in range(2):
                 arclength = 1.0 + BEYOND * (1.0 - rod.taper) * ways[i] if k else ways[i]
                 _write_row(rod, -deltas[d], arclength, forces, slenderness, work, tangential[d, k, i])
-    reach = rest_along(rod, 0.0, 1.0, work).distance
-    for k in range(distances.size):
-        found = chord_along(rod, 0.0, distances[k] * reach, work)
-        chord[0, k], chord[1, k], chord[2, k] = found.arclength, found.bearing, found.slope
 
 
 @compiled
@@ -329,8 +311,6 @@ def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet:
     for k, phase in enumerate((table.tip, table.tangential, table.beyond)):
         own.rows[k] = phase.coefficients.shape[2]
         _contract(phase, mirrored, own.outer, own.phases[k])
-    _contract(table.chord, mirrored, own.outer, own.at_rest[0])
-    _contract(table.chord, 1 - mirrored, own.outer, own.at_rest[1])
     return True
 
 
@@ -352,7 +332,7 @@ def _write_errors(
     profile: Profile, table: ForwardTable, samples: Floats, work: Floats, sheet: NDArray[np.void], out: Floats
 ) -> None:
     """Write the errors of the pose at points of all dimensions, given as shares, and amplitudes of modes, for contacts
-    before the thrust, or of the chord of the rod at rest, if they are larger."""
+    before the thrust."""
     box, at = table.box, samples
     for k in range(samples.shape[0]):
         taper = box[0, 0] + at[k, 0] * (box[0, 1] - box[0, 0])
@@ -372,11 +352,6 @@ def _write_errors(
         out[k] = max(out[k], abs(found.turn - exact.turn))
         if exact.u < 0.0:
             out[k] = 0.0
-        reach = rest_along(rod, 0.0, 1.0, work).distance
-        # Mostly near the tip, where a curved rod may lie across its chord.
-        distance = (1.0 - at[k, 5] * at[k, 5]) * reach
-        chord, known = chord_along(rod, 0.0, distance, work), chord_in(sheet, False, reach, distance)
-        out[k] = max(out[k], abs(known.arclength - chord.arclength), abs(known.at_base - chord.bearing))
 
 
 def _errors(profile: Profile, table: ForwardTable) -> Floats:

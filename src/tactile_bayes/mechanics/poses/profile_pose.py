@@ -50,7 +50,7 @@ def part_along(profile: Profile, march: March, until: float, force: float, work:
 
 @compiled
 def pose_along_in_phase(
-    profile: Profile, psi1: float, arclength: float, force: float, tip: bool, work: Floats
+    profile: Profile, psi1: float, arclength: float, force: float, tip: bool, work: Floats, remainder: float
 ) -> tuple[Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1 in tip contact or by the arc length in tangential contact, and by the force."""
     march, slopes = at_contact(profile, psi1, arclength), Slopes(1.0, 0.0, 0.0, 0.0, 0.0)
@@ -58,7 +58,7 @@ def pose_along_in_phase(
         curvature = rest_curvature_at(profile, cell_at(profile, arclength, BACKWARD), arclength)
         slopes = Slopes(-curvature, math.cos(psi1), 0.0, 0.0, 0.0)
     while march.at > 0.0:
-        _, march, slopes = advance(profile, march, BACKWARD, 0.0, force, work, EXACT, slopes)
+        _, march, slopes = advance(profile, march, BACKWARD, 0.0, force, work, remainder, slopes)
     psi_q, u_q, psi_f, u_f, v_f = slopes
     here = Pose(march.state.u, march.state.v, march.state.psi - psi1)
     v_q = here.u * psi_q - force * (u_q * psi_f - u_f * psi_q)
@@ -68,8 +68,8 @@ def pose_along_in_phase(
 
 @compiled
 def pose_along_and_slopes(
-    profile: Profile, psi1: float, arclength: float, force: float, work: Floats
+    profile: Profile, psi1: float, arclength: float, force: float, work: Floats, remainder: float
 ) -> tuple[Pose, Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1, by the arc length, and by the force."""
-    here, by_psi1, by_force = pose_along_in_phase(profile, psi1, arclength, force, bool(1), work)
-    return here, by_psi1, pose_along_in_phase(profile, psi1, arclength, force, bool(0), work)[1], by_force
+    here, by_psi1, by_force = pose_along_in_phase(profile, psi1, arclength, force, bool(1), work, remainder)
+    return here, by_psi1, pose_along_in_phase(profile, psi1, arclength, force, bool(0), work, remainder)[1], by_force

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.taylor import (
@@ -16,8 +18,10 @@ from tactile_bayes.mechanics.poses.taylor import (
     FARTHEST,
     FORWARD,
     ROUGH,
+    STATES,
     March,
     State,
+    Step,
     advance,
     arclength_to,
     begin,
@@ -28,8 +32,12 @@ from tactile_bayes.mechanics.poses.taylor import (
     point_at,
     rest_curvature_at,
     rise,
+    workspace,
 )
 from tactile_bayes.mechanics.rods.profile import Profile
+
+_STEPS, _STEPS_PER_CELL = 64, 16  # room for steps of a rod at rest
+_AT, _PSI, _U, _V, _LENGTH, _SHARE, _TERMS, _FARTHEST = range(8)  # columns of these steps
 
 _SAMPLES = 48  # points of a rod of length one, and one for each step, at which the bending is compared
 
@@ -42,6 +50,21 @@ class RestPoint(NamedTuple):
     bearing: float  # direction in which it is seen from the pivot [rad]
     slope: float  # slope of the rod there [rad]
     curvature: float  # rest curvature there [1/L]
+
+
+class AtRest(NamedTuple):
+    """The rod at rest, as steps from its beginning on: the same for all distances at which it is met."""
+
+    # Beginning of a step, state there, size as in `Step`, and the largest distance from the pivot on it; infinite
+    # after the last one, and NaN if there is no room for more. Shape (steps, 8).
+    steps: Floats
+    series: Floats  # of the states, as in a workspace, shape (steps, terms, columns)
+
+
+def room_at_rest(cells: int) -> AtRest:
+    """Return room for the steps of a rod of so many cells."""
+    rows = _STEPS + _STEPS_PER_CELL * cells
+    return AtRest(np.full((rows, 8), math.nan), np.empty((rows, *workspace()[:, :STATES].shape)))
 
 
 @compiled
@@ -124,6 +147,55 @@ def chord_along(profile: Profile, stem: float, distance: float, work: Floats) ->
     if math.isnan(march.state.psi):
         at, found = march.at, march.state
     return _chord(profile, at, found)
+
+
+@compiled
+def write_at_rest(profile: Profile, stem: float, work: Floats, out: AtRest) -> None:
+    """Write the steps of the rod at rest."""
+    march, k = begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0)), 0
+    while march.at < FARTHEST and k < out.steps.shape[0] - 1:
+        before, row = march, out.steps[k]
+        step, march, _ = advance(profile, before, FORWARD, FARTHEST, 0.0, work, EXACT, None)
+        end = moved(before.state, 0.0, step, peak(before.state, 0.0, step, 0.0, work), work)
+        row[_AT], row[_PSI], row[_U], row[_V] = before.at, before.state.psi, before.state.u, before.state.v
+        row[_LENGTH], row[_SHARE], row[_TERMS] = step.length, step.share, step.terms
+        row[_FARTHEST] = math.hypot(end.u, end.v)
+        for n in range(step.terms + 1):
+            for c in range(STATES):
+                out.series[k, n, c] = work[n, c]
+        k += 1
+    out.steps[k, _AT] = math.nan if march.at < FARTHEST else march.at
+
+
+@compiled
+def chord_at_rest(profile: Profile, stem: float, distance: float, at_rest: AtRest, work: Floats) -> RestPoint:
+    """The same as `chord_along`, from the steps of the rod or its mirror image."""
+    steps, farthest = at_rest.steps, 0
+    k = 0
+    while steps[k, _AT] < FARTHEST:
+        if steps[k, _FARTHEST] >= distance:
+            found = _point_of(profile, at_rest, k, distance)
+            if not math.isnan(found.distance):
+                return found
+        if steps[k, _FARTHEST] > steps[farthest, _FARTHEST]:
+            farthest = k
+        k += 1
+    if math.isnan(steps[k, _AT]):
+        return chord_along(profile, stem, distance, work)
+    return _point_of(profile, at_rest, farthest, math.inf)
+
+
+@compiled
+def _point_of(profile: Profile, at_rest: AtRest, k: int, distance: float) -> RestPoint:
+    """First point of a step at a distance, NaN without one, or its farthest one if the distance is infinite."""
+    row, series = at_rest.steps[k], at_rest.series[k]
+    # Without a load, steps do not depend on a taper.
+    step = Step(row[_LENGTH], row[_SHARE], int(row[_TERMS]), 1.0, 0.0, row[_LENGTH])
+    begins = State(row[_PSI], 0.0, row[_U], row[_V])
+    x = rise(begins, 0.0, step, 0.0, distance, series) if distance < math.inf else peak(begins, 0.0, step, 0.0, series)
+    end = moved(begins, 0.0, step, x, series)
+    end = State(profile.sign * end.psi, 0.0, end.u, profile.sign * end.v)
+    return _chord(profile, row[_AT] + arclength_to(step, x), end)
 
 
 @compiled

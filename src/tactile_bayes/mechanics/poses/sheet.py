@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose, scaled
+from tactile_bayes.mechanics.poses.pose import Pose, scaled
 from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
-# Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, most polynomials in what
-# differs between rods.
+# Most terms in ψ1 or s1, terms in the force, most polynomials in what differs between rods.
 MOST_ROWS, TERMS, MOST_NODES = 28, 24, 27
 COLUMNS = 3 * TERMS
 
@@ -28,7 +27,6 @@ _CACHE_LINE = 64  # bytes of a line of the processor's cache: numbers that lie i
 _SHEET = np.dtype(
     [
         ("phases", float, (3, MOST_ROWS, COLUMNS)),  # tip contact, tangential contact up to the tip, and beyond it
-        ("at_rest", float, (2, 1, COLUMNS)),  # of the rod, and of its mirror image
         ("sums", float, (2, COLUMNS)),  # workspace for one pose
         ("outer", float, (4, MOST_NODES)),  # polynomials in taper, bend, friction angle and amplitudes of modes
         ("least_psi1", float),  # ranges of the table
@@ -127,29 +125,3 @@ def _sums(rows: Floats, count: int, x: float, z: float, room: Floats) -> tuple[P
         u_x, v_x = u_x * z + by[j], v_x * z + by[j + 1]
         turn_x = turn_x * z + by[j + 2]
     return Pose(u, v, turn), Pose(u_x, v_x, turn_x), Pose(u_z, v_z, turn_z)
-
-
-@compiled
-def chord_in(sheet: NDArray[np.void], mirrored: bool, reach: float, distance: float) -> Chord:
-    """Chord of a rod or its mirror image at rest, continued beyond its tip as an arc. There its angle to the rod is
-    exact, and the arc length good enough for a point beside the tip."""
-    row = sheet[0].at_rest[1 if mirrored else 0, 0]
-    x = 2.0 * min(distance / reach, 1.0) - 1.0
-    arclength, bearing, slope, to_bearing, to_slope = 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(TERMS - 1, -1, -1):
-        to_bearing, to_slope = to_bearing * x + bearing, to_slope * x + slope
-        arclength = arclength * x + row[k]
-        bearing = bearing * x + row[TERMS + k]
-        slope = slope * x + row[2 * TERMS + k]
-    at_point = slope - bearing
-    rate = 2.0 / reach * (to_slope - to_bearing)
-    if distance <= reach:
-        return Chord(arclength, bearing, at_point, rate)
-    # The lever r sin(angle) of an arc grows by its curvature times r.
-    curvature = rate * math.cos(at_point) + math.sin(at_point) / reach
-    lever = reach * math.sin(at_point) + 0.5 * curvature * (distance * distance - reach * reach)
-    sine = min(max(lever / distance, -1.0), 1.0)
-    cos = math.sqrt((1.0 - sine) * (1.0 + sine))
-    beyond, angle = (distance - reach) / math.cos(at_point), math.asin(sine)
-    rate = (curvature - sine / distance) / cos if cos > ACROSS else 0.0
-    return Chord(arclength + beyond, slope + curvature * beyond - angle, angle, rate)

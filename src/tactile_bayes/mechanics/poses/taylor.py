@@ -36,9 +36,10 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
-_TERMS = 24  # terms of the series
-# Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand.
-EXACT, ROUGH = 1e-15, 1e-6
+_TERMS, _FEWER = 24, 18  # most terms of the series, and of those that need not be exact
+# Size of the last terms of a slope [rad]: for rounding errors of a pose, for errors of some 1e-9, and for those with
+# which a rod is followed roughly, to a part in a thousand.
+EXACT, CLOSE, ROUGH = 1e-15, 1e-7, 1e-6
 FORWARD, BACKWARD = 1.0, -1.0  # directions: from the pivot, and from the contact
 FARTHEST = 4.0  # arc length up to which a rod is continued beyond its tip, as it is at its tip [L]
 # Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
@@ -49,6 +50,7 @@ _INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
 _RATE, _SIN, _COS, _PSI, _U, _V, _BENDING, _PSI_Q, _U_Q, _BENDING_Q = range(10)
 # Columns of a workspace: coefficients, and those of derivatives by ψ1 or arc length, and the force.
 _PSI_F, _U_F, _V_F, _BENDING_F, _CURVATURE, _RIGIDITY, _POLYNOMIAL, _POWERS = range(10, 18)
+STATES = _V + 1  # the first columns, from which states along a step follow
 
 
 def workspace() -> Floats:
@@ -255,8 +257,9 @@ def series(
     inverse, width, span = 1.0 / work[0, _RIGIDITY], step.width, step.span
     square, twice, thrice = width * width, 2.0 * step.fall, 3.0 * step.fall
     cube = square * width
+    most = _TERMS if remainder < CLOSE else _FEWER
     load, size, before = march.state.load / cube, 0.0, 0.0
-    for n in range(_TERMS):
+    for n in range(most):
         share, at_sin, at_cos, u, v = _INVERSE[n], work[n, _SIN], work[n, _COS], work[n, _U], work[n, _V]
         bending = _divided(work, rigid, inverse, n, load, _BENDING)
         rate = span * (bending + work[n, _CURVATURE] if n < bent else bending)
@@ -288,8 +291,8 @@ def series(
         if n >= least and max(size, before) <= remainder:
             return Step(length, 1.0, n + 1, width, step.fall, span)
     size = max(size, before) / remainder
-    share = min(1.0, size ** (-1.0 / (_TERMS - 1))) if size < math.inf else math.nan
-    return Step(length, share, _TERMS, width, step.fall, span)
+    share = min(1.0, size ** (-1.0 / (most - 1))) if size < math.inf else math.nan
+    return Step(length, share, most, width, step.fall, span)
 
 
 @compiled
