@@ -255,8 +255,9 @@ _GOOD = 0.6  # efficiency from which no further round is made
 _MASS_DRAWS = 4000  # from which the mass of a proposal within the bounds is estimated
 _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights are made more equal to reach it
 # Four pieces have the efficiency of eight: 5 to 57 % for seven posteriors along bent ridges that a single one covers to
-# 1 to 10 %. After fewer rounds an efficiency that is enough is luck; after more, little is gained.
-_PIECES, _FEWEST, _MOST, _ENOUGH = 4, 4, 16, 0.5
+# 1 to 10 %. After the fewest rounds an efficiency that is enough is no luck; after the usual number, little is gained
+# unless some of the last rounds were better than all before.
+_PIECES, _FEWEST, _USUAL, _IN_VAIN, _MOST, _ENOUGH = 4, 4, 16, 6, 24, 0.5
 EFFICIENT = 0.35  # efficiency of a proposal above which ensembles converge in some hundred steps
 _DRAWS_OF_PIECES = 120  # per parameter in each of these rounds
 
@@ -319,16 +320,20 @@ def refined(
 ) -> Mixture:
     """Return a mixture of pieces that cover a bent target, if a proposal covers it poorly; else that alone. All draws
     are weighed by the mean density of all proposals so far (Cornuet et al. 2012, doi
-    10.1111/j.1467-9469.2011.00756.x)."""
-    size = proposal.mean.size
-    best, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()
+    10.1111/j.1467-9469.2011.00756.x). The efficiency is that of draws of the last mixture, or of the one before."""
+    size, best, since = proposal.mean.size, 0.0, 0
+    mixture, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()
     points, values = np.empty((0, size)), np.empty(0)
     while proposal.efficiency < EFFICIENT and len(rounds) < _MOST and not deadline.has_passed:
-        drawn, density = best.draw(rng, _DRAWS_OF_PIECES * size)
+        drawn, density = mixture.draw(rng, _DRAWS_OF_PIECES * size)
         found = log_probability(drawn)
-        if len(rounds) >= _FEWEST and effective_number(normalised(found - density)) >= _ENOUGH * len(drawn):
+        efficiency = float(effective_number(normalised(found - density))) / len(drawn)
+        since, best = (0, efficiency) if efficiency > best else (since + 1, best)
+        mixture = Mixture(tuple(replace(part, efficiency=efficiency) for part in mixture.parts))
+        is_enough = len(rounds) >= _FEWEST and efficiency >= _ENOUGH
+        if is_enough or (len(rounds) >= _USUAL and since >= _IN_VAIN):
             break
-        rounds.append((best, _log_within(best, rng)))
+        rounds.append((mixture, _log_within(mixture, rng)))
         points, values = np.concatenate([points, drawn]), np.append(values, found)
         surplus = values - logsumexp([one.log_density(points) - within for one, within in rounds], axis=0)
         log_mass = float(logsumexp(surplus) + np.log(len(rounds) / len(points)))
@@ -337,8 +342,6 @@ def refined(
             pieces = Mixture.fitted(points, range(size), _PIECES, proposal.ends, weights)
         except np.linalg.LinAlgError:
             break
-        ratios = values - log_mass - pieces.log_density(points) + _log_within(pieces, rng)
-        efficiency = float(np.exp(-logsumexp(ratios, b=normalised(surplus))))
         parts = (replace(part, efficiency=efficiency, log_mass=part.log_mass + log_mass) for part in pieces.parts)
-        best = Mixture(tuple(parts))
-    return best
+        mixture = Mixture(tuple(parts))
+    return mixture

@@ -110,6 +110,7 @@ event.register("numba:compile", _Rest())
 
 @functools.cache
 def _version() -> str:
-    """Hash of all source files of this package."""
-    sources = sorted(Path(__file__).parent.rglob("*.py"))
+    """Hash of all source files whose functions or constants are compiled."""
+    here = Path(__file__).parent
+    sources = [*sorted(here.rglob("*.py")), here.parent / "contours" / "halves.py"]
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:12]

@@ -11,7 +11,6 @@ from tactile_bayes.mechanics.poses import beam, forward_table, taylor
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLE, Box
 from tactile_bayes.mechanics.poses.forward_table import forward_table as tabulated
 from tactile_bayes.mechanics.rods.profile import profile_of
-from tactile_bayes.mechanics.rods.rod import Rod
 
 _beam_of, _beam_pose, _prepare, _Varied = beam.beam_of, beam.beam_pose, forward_table.prepare, beam.Varied
 _most = taylor.most_rest_curvature
@@ -87,37 +86,12 @@ def test_poses_of_a_rod(rod, sign):
     compared(profile._replace(sign=sign), table, 0.3)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_poses_of_a_rod_with_a_bend_need_a_fine_table(sign):
-    profile = profile_of(lambda s: 1.5 + 1.5 * np.tanh((s - 0.65) / 0.2))._replace(sign=sign)
-    box = Box((0.0, 0.0), (0.0, 0.0), (0.0, 0.5))
-    assert tabulated(profile, box) is NO_TABLE
-    table = tabulated(profile, box, grade=1)
-    compared(profile, table, 0.3)
-    assert_integrated(profile, table, True, [[-0.7, 1.0, 1.0], [2.5, 1.0, 1.0], [0.2, 1.0, 21.0]])
-
-
 @pytest.mark.parametrize("sign", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_poses_of_rods_between_nodes_and_at_the_ends_of_ranges(sign):
     profile = profile_of(lambda s: 0.5 - s, 1.0, 0.5)
     table = tabulated(profile, Box((0.35, 0.65), (-0.2, 0.2), (0.0, 0.5)))
     for taper, bend, delta in ((0.35, 0.2, 0.0), (0.65, -0.2, 0.5), (0.41, 0.07, 0.2), (0.6, 0.0, 0.01)):
         compared(profile._replace(taper=taper, bend=bend, sign=sign), table, delta)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_poses_of_a_rod_with_modes(sign):
-    """Within the ball of amplitudes; beyond it there is no table."""
-    modes = [
-        lambda s: 0.06 * (1.0 - s) ** 4,
-        lambda s: 0.04 * (s - 0.2),
-        *(lambda s, k=k: 0.06 / k * np.cos(3.0 * k * s) for k in (2, 4, 6)),
-    ]
-    profile = Rod(rest_curvature=lambda s: 0.15 + 0.5 * s, rest_shape_modes=modes).profile._replace(sign=sign)
-    table = tabulated(profile, Box((0.0, 0.0), (0.0, 0.0), (0.0, 0.5), 4.5))
-    for shape in ((0.0,) * 5, (4.4, 0.0, 0.0, 0.0, 0.0), (-2.0, 2.0, -2.0, 2.0, 2.0), (1.0, -4.0, 0.5, 1.0, -0.5)):
-        compared(profile.shaped(np.array(shape)), table, 0.2)
-    assert not poses(profile.shaped(np.array([2.5, 2.5, 2.0, 2.0, 2.0])), table, 0.2, [0.1], [1.0], [1.0], True)[0]
 
 
 @pytest.mark.slow
@@ -145,23 +119,3 @@ def test_the_bound_of_the_rest_curvature_is_not_below_it():
             s = np.linspace(0.0, 1.0, 1001)
             most = max(sign * (rod.curvature(at) + 0.1) for at in s)
             assert bound(profile) >= most - 1e-9
-
-
-def test_strong_friction_of_a_hooked_rod_needs_a_small_range_of_the_force():
-    """A rod bent toward the object, that is pulled along it, is far from its rest shape under larger forces."""
-    profile = profile_of(lambda s: -2.6 * (1.0 + np.tanh((s - 0.75) / 0.12)))
-    box = Box((0.0, 0.0), (0.0, 0.0), (0.5, 0.7))
-    assert tabulated(profile, box, grade=1) is NO_TABLE
-    table = tabulated(profile, box, grade=2)
-    assert table is not NO_TABLE
-    rng, count = np.random.default_rng(1), 200
-    force, arclength, tangential = rng.uniform(0.0, 6.9, count), rng.uniform(0.05, 1.0, count), np.full(count, -0.6)
-    for sign, tip in ((1.0, True), (-1.0, True), (1.0, False), (-1.0, False)):
-        bent, ends = profile._replace(sign=sign), np.ones(count)
-        psi1 = rng.uniform(-0.6, 2.3, count) if tip else tangential
-        scaled = force if tip else force / arclength**2
-        held, found = poses(bent, table, 0.6, psi1, ends if tip else arclength, scaled, tip)
-        exact = poses(bent, NO_TABLE, 0.6, psi1, ends if tip else arclength, scaled, tip)[1]
-        assert held
-        before = exact[:, 0, 0] >= 0.0
-        assert np.abs(found - exact)[before, 0].max() < 1e-5

@@ -130,7 +130,12 @@ class RecordLikelihood:
         readings = len(self.measured) if self.blocks is None else float(self.blocks.readings.sum())
         share = _UNFELT * math.sqrt(min(1.0, 360.0 / readings))
         self._tolerance = np.maximum(share * self._noise / per_load, _LEAST * largest)
-        self._may_be_rough = not self.exact and float((self._tolerance / largest).min()) >= _ROUGHLY
+        self._tolerated_share = float((self._tolerance / largest).min())
+
+    @property
+    def _may_be_rough(self) -> bool:
+        """True if errors of a table, or of shorter series, are negligible."""
+        return not self.exact and self._tolerated_share >= _ROUGHLY
 
     def paths(
         self, contours: Contour, rig: RigValues | None = None, *, exact: bool = True, drive_angles: Floats | None = None
@@ -174,8 +179,8 @@ class RecordLikelihood:
 
         profile = self._profile(rig)
         # Where a rod may stick, sliding and sticking must not differ by the error of a table: it hardly yields along
-        # itself.
-        if profile is None or not self._may_be_rough or self.segments.has_history:
+        # itself. Tables of a rod whose shape is uncertain take longer than they save.
+        if profile is None or not self._may_be_rough or self.segments.has_history or self.rod.rest_shape_modes:
             return NO_TABLES
         return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction, rig.length)
 

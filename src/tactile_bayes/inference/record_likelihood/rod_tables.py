@@ -20,12 +20,11 @@ if TYPE_CHECKING:
 # default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
 # for uneven curvature that of the rest curvature.
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
-_SHAPES = 4.0, 3.0  # amplitudes of the modes of a traced rod: one of 150, and one of 9 draws from the prior is beyond
 _LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
 # Angles of friction in the two tables of a likelihood.
 _FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
 # Share of rods with friction beyond the first table up to which they are integrated: 7 % of draws from the default
-# prior, for which the second table of a traced rod would be a sixth of a start's time.
+# prior.
 _FEW = 0.1
 
 
@@ -50,17 +49,16 @@ class RodTables:
         return self._table(profile, varied, False), self._table(profile, varied, True) if is_strong else NO_TABLE
 
     def _table(self, profile: Profile, varied: tuple[bool, bool, bool, bool], is_strong: bool) -> ForwardTable:
-        from tactile_bayes.mechanics.poses.forward_table import GRADES, NO_TABLE, forward_table
+        from tactile_bayes.mechanics.poses.forward_table import NO_TABLE, forward_table
 
         key = *varied, is_strong
         if key not in self.made:
             widths = _TAPERS if varied[0] else (0.0,), _BENDS if varied[1] else (0.0,)
             angle = float(np.arctan(self._friction))
             low, high = _FRICTION_ANGLES[is_strong] if varied[2] else (angle, angle)
-            shapes = _SHAPES if self._rod.rest_shape_modes else (0.0,)
-            for grade, shape, bend, taper in product(range(GRADES), shapes, *widths[::-1]):
+            for bend, taper in product(*widths[::-1]):
                 box = self._box(taper, bend, (low, high), _LENGTHS if varied[3] else (1.0, 1.0))
-                self.made[key] = forward_table(profile, box._replace(shape=shape), grade)
+                self.made[key] = forward_table(profile, box)
                 if self.made[key] is not NO_TABLE:
                     break
         return self.made[key]

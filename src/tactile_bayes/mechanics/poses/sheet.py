@@ -13,29 +13,27 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import Pose, scaled
-from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
 # Most terms in ψ1 or s1, terms in the force, most polynomials in what differs between rods.
-MOST_ROWS, TERMS, MOST_NODES = 28, 24, 27
+MOST_ROWS, TERMS, MOST_NODES = 16, 24, 7
 COLUMNS = 3 * TERMS
 
 GROUP = 4  # terms in ψ1 or s1 that are summed at a time
 MOST_FORCE, BEYOND = 36.0, 0.6  # largest f Λ², and largest Λ beyond the tip, over Λ(1)
+MOST_PSI1 = 1.4  # largest ψ1 in tip contact [rad]
 SCALE = 10.0  # f Λ² from which on polynomials are in its logarithm
+SPAN = math.log1p(MOST_FORCE / SCALE)  # largest logarithm
 _CACHE_LINE = 64  # bytes of a line of the processor's cache: numbers that lie in two of them take longer to load
 # Coefficients of one rod.
 _SHEET = np.dtype(
     [
         ("phases", float, (3, MOST_ROWS, COLUMNS)),  # tip contact, tangential contact up to the tip, and beyond it
         ("sums", float, (2, COLUMNS)),  # workspace for one pose
-        ("outer", float, (4, MOST_NODES)),  # polynomials in taper, bend, friction angle and amplitudes of modes
-        ("least_psi1", float),  # ranges of the table
-        ("most_psi1", float),
-        ("span", float),
+        ("outer", float, (3, MOST_NODES)),  # polynomials in taper, bend and friction angle
+        ("least_psi1", float),  # of the table
         ("sign", float),  # the rod
         ("taper", float),
         ("bend", float),
-        ("shape", float, (MOST_MODES,)),
         ("friction_angle", float),
         ("rows", np.intp, (3,)),  # numbers of terms in ψ1 or s1 of the phases
     ],
@@ -66,13 +64,12 @@ def pose_in(
 ) -> tuple[bool, Pose, Pose, Pose]:
     """True if there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
     length, rate = length_of(slenderness, taper, arclength)
-    own = sheet[0]
-    loading, span = force * length * length, own.span
-    z, by_loading = 2.0 / span * math.log1p(loading / SCALE) - 1.0, 2.0 / (span * (SCALE + loading))
+    own, loading = sheet[0], force * length * length
+    z, by_loading = 2.0 / SPAN * math.log1p(loading / SCALE) - 1.0, 2.0 / (SPAN * (SCALE + loading))
     phase, begin, by_x, at = 1, 0.0, 2.0, arclength
     if tip:
         phase, begin, at = 0, own.least_psi1, psi1
-        by_x = 2.0 / (own.most_psi1 - begin)
+        by_x = 2.0 / (MOST_PSI1 - begin)
     elif arclength > 1.0:
         phase, begin, by_x = 2, 1.0, 2.0 / (BEYOND * (1.0 - taper))
     x, by_force = (at - begin) * by_x - 1.0, by_loading * length * length
