@@ -132,7 +132,8 @@ def test_a_bent_ridge_is_covered_by_pieces_that_find_it():
         return effective_number(normalised(log_density_of_ridge(points) - density)) / len(points)
 
     assert efficiency(single) < 0.02
-    assert efficiency(pieces) > 0.1
+    assert efficiency(pieces) > 0.05
+    assert pieces.efficiency <= 1.0
     mass = np.logaddexp.reduce([part.log_mass for part in pieces.parts])
     constant = pieces.parts[0].constant  # which log-densities of proposals lack
     expected = 2.0 * np.log(2.0 * np.pi) + np.log(0.1 * 0.5) + np.log(UNITS).sum()
