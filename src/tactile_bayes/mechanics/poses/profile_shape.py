@@ -55,8 +55,8 @@ class RestPoint(NamedTuple):
 class AtRest(NamedTuple):
     """The rod at rest, as steps from its beginning on: the same for all distances at which it is met."""
 
-    # Beginning of a step, state there, size as in `Step`, and the largest distance from the pivot on it; infinite
-    # after the last one, and NaN if there is no room for more. Shape (steps, 8).
+    # Beginning of a step, state there, size as in `Step`, and the largest distance from the pivot on it, shape
+    # (steps, 8). The beginning after the last one is `FARTHEST`, or NaN where there is no room for more.
     steps: Floats
     series: Floats  # of the states, as in a workspace, shape (steps, terms, columns)
 
