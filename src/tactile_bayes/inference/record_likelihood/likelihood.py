@@ -240,7 +240,8 @@ class RecordLikelihood:
             profile=self._profile(rig),
             known=self._known(rig),
             tolerance=None if self.exact else self._tolerance,
-            roughly=self._may_be_rough,
+            # A rod that turns about a pivot begins at a point of its shape at rest, which a shorter series would miss.
+            roughly=self._may_be_rough and self.segments.has_history,
             asks_clearance=not self.is_always_clear,
         )
 
