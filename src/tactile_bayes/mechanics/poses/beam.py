@@ -42,6 +42,7 @@ from tactile_bayes.mechanics.poses.sheet import is_far, pose_in, sheet
 from tactile_bayes.mechanics.poses.taylor import (
     EXACT,
     FORWARD,
+    ROUGH,
     March,
     State,
     cell_at,
@@ -387,10 +388,11 @@ def from_tip(varied: Varied | None, beam: Beam, psi1: float) -> March:
 def loaded_part(varied: Varied | None, beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
     """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
 
-    The walk goes on from the end of the part before.
+    The walk goes on from the end of the part before; where there are tables, roughly.
     """
     share = part / PARTS
     if varied is None:
         here = pose(psi1, share, force, beam.curvature)
         return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
-    return part_along(varied.profile, before, 1.0 - share, force, varied.work, varied.remainder)
+    remainder = ROUGH if varied.slenderness > 0.0 else varied.remainder
+    return part_along(varied.profile, before, 1.0 - share, force, varied.work, remainder)
