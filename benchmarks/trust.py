@@ -6,6 +6,7 @@ whole. Of a record that the check finds not described, `tb.causes` names what is
 cause comes first, and among the first two. The last rows count all records, which are kept in results/trust.
 
 With --causes, nothing is sampled: causes are sought beside the best fit, where it is taken as stated what is wrong.
+With --cures, they are inferred again as the first of these causes says, and the band is compared with the truth.
 """
 
 from __future__ import annotations
@@ -17,18 +18,22 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from benchmarks.misspecification import CASES, SETTINGS
 from benchmarks.table import counts_and_names, folder_name, line, stored
+from tactile_bayes.assessment.assumptions import alternatives_by_channel, alternatives_of
 from tactile_bayes.assessment.causes import causes, causes_beside
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.replicate import make_replicate
+from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_optimum import optimum_beside
 from tactile_bayes.numerics.random_numbers import child
 
@@ -77,43 +82,101 @@ def main(records: int = 6, *names: str) -> None:
         print(line(words, (counted[held, said] for said in CONCLUSIONS), 24, 40))
 
 
-def name_causes(records: int = 6, *names: str) -> None:
-    """Print how often the true cause comes first, and among the first two, of records that the best fit leaves open."""
+def name_causes(records: int = 6, *names: str, cure: bool = False) -> None:
+    """Print how often the true cause comes first, and among the first two, of records that the best fit leaves open;
+    or the bands with what is shown for the first."""
     print(f"{records} records of each rig, best fits alone; shares are of the misfits\n")
-    print(line("", ("misfits", "cause", "of two", "seconds", "lost"), 30), flush=True)
+    heads = ("in the gap", "beside it", "whole", "check") if cure else ("cause", "of two", "seconds")
+    print(line("", ("misfits", *heads, "lost"), 30), flush=True)
+    what, function, cells_of = ("cures", one_cure, cells_of_cures) if cure else ("causes", one_cause, cells_of_causes)
     every: list[Row] = []
     for name, runs in CASES.items():
         if not names or name in names:
             other = "as stated" if "as stated" in runs else ""
-            rows = stored(OUT / folder_name(f"causes of {name}"), {"case": name}, one_cause, (name, other), records)
+            rows = stored(OUT / folder_name(f"{what} of {name}"), {"case": name}, function, (name, other), records)
             every += rows
-            print(line(name, cells_of_causes(rows), 30), flush=True)
-    print(line("all", cells_of_causes(every), 30))
+            print(line(name, cells_of(rows), 30), flush=True)
+    print(line("all", cells_of(every), 30))
 
 
-def one_cause(task: tuple[tuple[str, str], int]) -> Row:
-    """Return the rank of the true cause of one record, and what comes first."""
+class Judged(NamedTuple):
+    """Causes of the misfit of one record beside its best fit."""
+
+    experiment: SimulatedExperiment
+    own: Experiment  # that of the record
+    causes: xr.Dataset
+    is_misfit: bool
+    seconds: float
+
+
+def judged(task: tuple[tuple[str, str], int]) -> Judged:
     (name, other), number = task
     run = CASES[name][other]
     experiment = experiment_of(rng=2031, rig=run.rig, truth=run.truth, settings=SETTINGS, **run.options)
     for_record, *_ = child(experiment.seed, number).spawn(3)
+    measured, truth = simulate(experiment, np.random.default_rng(for_record))[:2]
+    model = experiment.problem_of(measured).model
+    best = optimum_beside(model, [{name: truth[name] for name in model.forward_parameters if name in truth}])
+    known = dict(zip(model.names, best.point.tolist(), strict=True))
+    began, own = time.process_time(), replace(experiment.assumed, record=measured)
+    found = causes_beside(own, known)
+    seconds = time.process_time() - began
+    is_open = not found.attrs.get("described", 0) or bool(found.log_evidence.values[:1] > NAMED)
+    return Judged(experiment, own, found, is_open, seconds)
+
+
+def one_cause(task: tuple[tuple[str, str], int]) -> Row:
+    """Return the rank of the true cause of one record, and what comes first."""
+    name = task[0][0]
     try:
-        measured, truth = simulate(experiment, np.random.default_rng(for_record))[:2]
-        model = experiment.problem_of(measured).model
-        best = optimum_beside(model, [{name: truth[name] for name in model.forward_parameters if name in truth}])
-        known = dict(zip(model.names, best.point.tolist(), strict=True))
-        began = time.process_time()
-        found = causes_beside(replace(experiment.assumed, record=measured), known)
+        _, _, found, is_misfit, seconds = judged(task)
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
-    seconds, named = time.process_time() - began, found.cause.values.tolist()
+    named = found.cause.values.tolist()
     if "misread" in found.attrs:
         said = found.attrs["misread"]
         rank = 1.0 if name.startswith("outliers") and "neighbours" in said else 100.0
         return {"conclusion": "", "misfit": True, "rank": rank, "first": [said], "seconds": seconds}
-    is_misfit = not found.attrs.get("described", 0) or bool(found.log_evidence.values[:1] > NAMED)
     rank = _rank(name, named) if is_misfit else math.nan
     return {"conclusion": "", "misfit": is_misfit, "rank": rank, "first": named[:3], "seconds": seconds}
+
+
+def one_cure(task: tuple[tuple[str, str], int]) -> Row:
+    """Return how the band holds that the remedy of the first cause gives of one record."""
+    try:
+        experiment, own, found, is_misfit, _ = judged(task)
+        if not is_misfit or not found.cause.size:
+            return {"conclusion": "", "misfit": False}
+        first = str(found.cause.values[0])
+        first = "family shape-free" if first.startswith(("flat spot", "corner")) else first
+        every = alternatives_of(own)
+        every += alternatives_by_channel(own, [each.name for each in every])
+        assumed = next(each.experiment for each in every if each.name.replace(" inferred", "") == first)
+        truth = experiment.truth
+        truth = replace(truth, rig=truth.rig or own.rig, family=truth.family or own.own_family)
+        cured = replace(
+            experiment,
+            assumed=replace(assumed, record=experiment.assumed.record),
+            truth=truth,
+            settings=replace(SETTINGS, walkers=None),
+            probability=PROBABILITY,
+        )
+        numbers = make_replicate(cured, task[1], throw=True).outcome.numbers
+    except TactileBayesError as error:
+        return {"conclusion": LOST, "summary": str(error)}
+    wholes = [numbers.get(f"simultaneous_{region}", math.nan) for region in ("in_gap", "beside")]
+    bands = {region: numbers.get(f"pointwise_{region}", math.nan) for region in ("in_gap", "beside")}
+    whole = float(np.nanmin(wholes)) if np.isfinite(wholes).any() else math.nan
+    done = {"check_passed": float(numbers["check_passed"]), "converged": float(numbers["converged"])}
+    return {"conclusion": "", "misfit": True, "first": first, **bands, "whole": whole, **done}
+
+
+def cells_of_cures(rows: list[Row]) -> list[str]:
+    left = [row for row in rows if row["conclusion"] != LOST]
+    cured = [row for row in left if row["misfit"]]
+    means = [_mean(row[key] for row in cured) for key in ("in_gap", "beside", "whole", "check_passed")]
+    shown = [f"{mean:.2f}" if mean == mean else "–" for mean in means]
+    return [f"{len(cured)}/{len(left)}", *shown, str(len(rows) - len(left))]
 
 
 def cells_of_causes(rows: list[Row]) -> list[str]:
@@ -121,12 +184,8 @@ def cells_of_causes(rows: list[Row]) -> list[str]:
     ranks = [rank for rank in (row["rank"] for row in left) if rank is not None and not math.isnan(rank)]
     shares = [f"{_mean(float(rank <= most) for rank in ranks):.0%}" if ranks else "–" for most in (1.0, 2.0)]
     misfits = sum(row["misfit"] for row in left)
-    return [
-        f"{misfits}/{len(left)}",
-        *shares,
-        f"{_mean(row['seconds'] for row in left):.1f}",
-        str(len(rows) - len(left)),
-    ]
+    seconds = f"{_mean(row['seconds'] for row in left):.1f}"
+    return [f"{misfits}/{len(left)}", *shares, seconds, str(len(rows) - len(left))]
 
 
 def one(task: tuple[tuple[str, str], int]) -> Row:
@@ -182,4 +241,7 @@ def _mean(values: Any) -> float:
 
 if __name__ == "__main__":
     counts, chosen = counts_and_names(sys.argv[1:])
-    (name_causes if "--causes" in sys.argv else main)(*(counts or [6]), *chosen)
+    if {"--causes", "--cures"} & set(sys.argv):
+        name_causes(*(counts or [6]), *chosen, cure="--cures" in sys.argv)
+    else:
+        main(*(counts or [6]), *chosen)

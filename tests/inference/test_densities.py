@@ -9,6 +9,7 @@ from tactile_bayes.inference.densities import (
     Mixture,
     Proposal,
     approximate,
+    at_maximum,
     effective_number,
     normalised,
     refined,
@@ -52,6 +53,42 @@ def test_a_normal_target_is_found_from_a_poor_guess(wrong):
 def test_where_nothing_is_possible_nothing_is_promised():
     nowhere = approximate(lambda p: np.full(len(p), -np.inf), np.zeros(2), np.eye(2), np.random.default_rng(8))
     assert nowhere.efficiency == 0.0
+
+
+@pytest.mark.parametrize("wrong", [0.3, 3.0])
+def test_a_normal_target_has_its_mean_and_covariance_at_its_maximum(wrong):
+    """From a guess that knows no correlation, five deviations off along a ridge a thousandth as wide as long."""
+    target, size = stats.multivariate_normal(MEAN, ROOT @ ROOT.T), np.sqrt(np.diag(ROOT @ ROOT.T))
+    middle, root = at_maximum(target.logpdf, MEAN + 5.0 * ROOT[:, 0], np.diag(wrong * size))
+    np.testing.assert_allclose((middle - MEAN) / size, 0.0, atol=1e-5)
+    np.testing.assert_allclose(root @ root.T, ROOT @ ROOT.T, rtol=1e-5)
+
+
+def test_the_maximum_is_found_from_where_the_density_is_convex():
+    """Student's t, whose logarithm is convex beyond the root of its freedom; its curvature is (ν + 1)/ν."""
+    middle, root = at_maximum(lambda points: stats.t(3.0).logpdf(points).sum(axis=1), np.array([4.0, -6.0]), np.eye(2))
+    np.testing.assert_allclose(middle, 0.0, atol=0.02)
+    np.testing.assert_allclose(root @ root.T, 0.75 * np.eye(2), atol=0.1)
+
+
+def test_a_maximum_at_an_end_is_approached_from_within():
+    """Of a density that falls from zero on, and a guess that reaches below."""
+    ends = Ends(np.array([0.0, -np.inf]), np.full(2, np.inf))
+
+    def target(points):
+        return np.where(ends.hold(points), -3.0 * points[:, 0] - 0.5 * points[:, 1] ** 2, -np.inf)
+
+    middle, root = at_maximum(target, np.array([0.5, 2.0]), np.eye(2), ends=ends)
+    assert 0.0 < middle[0] < 0.1
+    assert np.isfinite(root).all()
+    assert middle[1] == pytest.approx(0.0, abs=0.01)
+    assert root[1, 1] == pytest.approx(1.0, abs=0.01)
+
+
+def test_where_nothing_is_possible_the_guess_is_left():
+    middle, root = at_maximum(lambda p: np.full(len(p), -np.inf), np.ones(2), np.eye(2))
+    np.testing.assert_array_equal(middle, np.ones(2))
+    np.testing.assert_array_equal(root, np.eye(2))
 
 
 COVARIANCE = np.array([[1.0, 0.8], [0.8, 2.0]])

@@ -35,7 +35,10 @@ TEXTS: Mapping[str, str] = {
         "the direction, and was the load cell tared?"
     ),
     "no fit": "The loads of {share} of the {loaded} loaded samples fit no contact of such a rod: {advice}.",
-    "below the pivot": "Of the {loaded} loaded samples {share} touch something below the pivot, not above: {advice}.",
+    "below the pivot": (
+        "Of the {loaded} loaded samples {share} touch something below the pivot. Does the object reach there? If not, "
+        "{advice}."
+    ),
     "contradiction": (
         "The loads of single samples contradict one another, whatever the contour (noise explains it with probability "
         f"{{chance}}): {CHECK_RIG}.{{dragging}}"

@@ -258,6 +258,7 @@ _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights ar
 # 1 to 10 %. After the fewest rounds an efficiency that is enough is no luck; after the usual number, little is gained
 # unless some of the last rounds were better than all before.
 _PIECES, _FEWEST, _USUAL, _IN_VAIN, _MOST, _ENOUGH = 4, 4, 16, 6, 24, 0.5
+_BENT = 0.25  # efficiency of a single proposal below which pieces are tried: along bent ridges it is seldom more
 EFFICIENT = 0.35  # efficiency of a proposal above which ensembles converge in some hundred steps
 _DRAWS_OF_PIECES = 120  # per parameter in each of these rounds
 
@@ -307,6 +308,52 @@ def approximate(
     return best
 
 
+_FIRST_WIDTH, _WIDTH = 0.01, 0.3  # of differences, in units of the guess and then of the curvature found before
+_ROOM, _NEARER = 0.45, 0.9  # largest width, and step, over the distance to an end
+_MOST_STEPS, _LEAST_GAIN = 12, 0.3  # of Newton's method, and the gain of log-density below which it ends
+_FLATTEST = 0.04  # least curvature that is believed, in units of the one before
+_LENGTHS = 2.0 ** -np.arange(-1.0, 9.0)  # of a step, among which the best is taken
+
+
+def at_maximum(
+    log_probability: LogProbability, centre: Floats, root: Floats, deadline: Deadline = NEVER, ends: Ends = ANYTHING
+) -> tuple[Floats, Floats]:
+    """Return the maximum of a smooth target near a centre, and a root of the inverse of its curvature there. Newton's
+    method takes differences along the columns of the last such root, first of a guess."""
+    size, value, width = centre.size, -np.inf, _FIRST_WIDTH
+    one, two = np.triu_indices(size, 1)
+    for _ in range(_MOST_STEPS):
+        if deadline.has_passed:
+            break
+        with np.errstate(divide="ignore", invalid="ignore"):
+            room = np.minimum(centre - ends.low, ends.high - centre)[:, None] / np.abs(root)
+        widths = np.fmin(width, _ROOM * np.fmin.reduce(room, axis=0))
+        along = np.diag(widths)
+        pairs = along[one] + along[two]
+        points = centre + np.concatenate([np.zeros((1, size)), along, -along, pairs, -pairs]) @ root.T
+        values = log_probability(points)
+        here, (ahead, back) = values[0], values[1 : 2 * size + 1].reshape(2, size)
+        with np.errstate(divide="ignore", invalid="ignore"):  # beside what is impossible
+            slope = (ahead - back) / (2.0 * widths)
+            bend = 2.0 * here - ahead - back
+            twice = 2.0 * here - values[2 * size + 1 :].reshape(2, -1).sum(axis=0)
+            curvature = np.diag(bend / widths**2)
+            curvature[two, one] = (twice - bend[one] - bend[two]) / (2.0 * widths[one] * widths[two])
+        if not (np.isfinite(slope).all() and np.isfinite(curvature).all()):
+            break
+        sizes, axes = np.linalg.eigh(curvature, UPLO="L")
+        sizes = np.maximum(np.abs(sizes), _FLATTEST)  # steps go up where the target is convex, too
+        steps = _LENGTHS[:, None] * (root @ (axes @ ((axes.T @ slope) / sizes)))
+        further = centre + np.clip(steps, _NEARER * (ends.low - centre), _NEARER * (ends.high - centre))
+        points, values = np.concatenate([points, further]), np.append(values, log_probability(further))
+        root, width = root @ (axes / np.sqrt(sizes)) @ axes.T, _WIDTH
+        best = int(np.argmax(values))
+        centre, value, gain = points[best], float(values[best]), float(values[best]) - value
+        if gain < _LEAST_GAIN:
+            break
+    return centre, root
+
+
 def _log_within(proposal: Proposal | Mixture, rng: np.random.Generator) -> float:
     """Return the logarithm of the share of a proposal's mass within its bounds."""
     if proposal.ends is ANYTHING:
@@ -324,7 +371,7 @@ def refined(
     size, best, since = proposal.mean.size, 0.0, 0
     mixture, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()
     points, values = np.empty((0, size)), np.empty(0)
-    while proposal.efficiency < EFFICIENT and len(rounds) < _MOST and not deadline.has_passed:
+    while proposal.efficiency < _BENT and len(rounds) < _MOST and not deadline.has_passed:
         drawn, density = mixture.draw(rng, _DRAWS_OF_PIECES * size)
         found = log_probability(drawn)
         efficiency = float(effective_number(normalised(found - density))) / len(drawn)

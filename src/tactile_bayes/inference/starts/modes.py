@@ -11,7 +11,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Coordinates, FlankCoordinates, in_coordinates
 from tactile_bayes.inference.deadline import Deadline
-from tactile_bayes.inference.densities import ANYTHING, EFFICIENT, Ends, Proposal, approximate
+from tactile_bayes.inference.densities import ANYTHING, EFFICIENT, WIDENING, Ends, Proposal, approximate, at_maximum
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather, square_root
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, are_alike, optima_of
@@ -125,6 +125,13 @@ class Modes:
         target, centre = in_coordinates(self.model.log_probability, coordinates), coordinates.of(optimum.point[None])[0]
         cloud = gather(target, centre, covariance, self.rng, self.deadline, ends)
         proposal = approximate(target, cloud.centre, cloud.narrow_covariance, self.rng, self.deadline, ends)
+        if proposal.efficiency <= EFFICIENT:
+            guess = square_root(cloud.narrow_covariance)
+            middle, root = at_maximum(target, cloud.centre, guess, self.deadline, ends)
+            again = approximate(target, middle, root @ root.T, self.rng, self.deadline, ends)
+            if again.efficiency > proposal.efficiency:
+                narrow = again.root @ again.root.T / WIDENING**2
+                cloud, proposal = gather(target, again.mean, narrow, self.rng, self.deadline, ends), again
         return PosteriorMode(optimum, cloud, proposal, coordinates)
 
 
