@@ -15,7 +15,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.densities import LogProbability, Mixture, refined
+from tactile_bayes.inference.densities import LogProbability, Mixture, at_maximum, refined
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.ensembles.moves import moves_in
 from tactile_bayes.inference.ensembles.run_state import Block, make_block
@@ -125,6 +125,9 @@ class _Start(NamedTuple):
         spread = np.full(count, _WHITENED_SPREAD)
         spread[: whitening.bent] = _ROUGHNESS_SPREAD
         spread[2 : 2 + len(noise.of_white)] = _NOISE_SPREAD
+        if noise.of_discrepancy:  # which makes residuals alike, as the approximation does not know
+            whitening = _at_mode(log_probability, whitening, centre, spread, deadline)
+            log_probability, centre = in_coordinates(self.model.log_probability, whitening), whitening.middle
         cloud = gather(log_probability, centre, np.diag(np.square(spread)), self.rng, deadline)
         if not cloud.is_possible:
             raise InferenceError("nothing near is possible")
@@ -138,8 +141,9 @@ class _Start(NamedTuple):
         )
         # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
         log_evidence = float(log_probability(whitening.middle[None])[0])
-        rest = slice(whitening.bent, None)
-        whitening, start = standardise(self.model.log_probability, whitening, start, rest, self.rng, deadline)
+        if not noise.of_discrepancy:
+            rest = slice(whitening.bent, None)
+            whitening, start = standardise(self.model.log_probability, whitening, start, rest, self.rng, deadline)
         return Walk(start, whitening, log_evidence)
 
     def scattered(self) -> Walk:
@@ -217,6 +221,16 @@ def mean_square_left(model: ContourModel, point: Floats) -> float:
         left, variance = given_before(left, noise**2, still, discrepancy.of(np.flatnonzero(model.present)))
         noise = np.sqrt(variance)
     return float(np.mean(np.minimum(np.abs(left / noise), _FARTHEST) ** 2))
+
+
+def _at_mode(
+    log_probability: LogProbability, base: Whitening, centre: Floats, spread: Floats, deadline: Deadline
+) -> Whitening:
+    """Return coordinates standardised by the curvature of the log-density at its maximum, sought from a centre."""
+    middle, root = at_maximum(log_probability, centre, np.diag(spread), deadline)
+    bent, precision = base.bent, np.linalg.inv(root @ root.T)
+    given_bent = np.linalg.cholesky(np.linalg.inv(precision[bent:, bent:]))
+    return replace(base, scales=np.exp(middle[:bent])).standardised(middle[bent:], given_bent)
 
 
 _STEPS = (40, 80, 160, 320)  # of each pilot run
