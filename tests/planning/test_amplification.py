@@ -133,14 +133,14 @@ def test_standard_deviations_are_those_of_noise_that_is_drawn(name):
     record, grown = record.isel(sample=every), grown.isel(sample=every)
     cell = replace(plan.cell, bias=(0.0, 0.0, 0.0), gain=tb.LoadCell().gain)
     noise = cell.simulate(np.zeros((draws, every.size, 3)), rng=rng).reshape(-1, 3)
-    many = record.isel(sample=np.tile(np.arange(every.size), draws))
+    many = record.isel(sample=np.repeat(np.arange(every.size), draws))  # so that the drive does not turn back
     noisy = {name: many[name] + noise[:, k] for k, name in enumerate(tb.record.CHANNELS)}
     noisy["drive_angle"] = many.drive_angle + cell.drive_angle_noise * rng.standard_normal(noise.shape[0])
     truth = np.array([record.truth_contact_x.values, record.truth_contact_y.values])
     for method in METHODS:
-        off = reconstructed(many.assign(noisy), plan, method).reshape(2, draws, every.size) - truth[:, None]
+        off = reconstructed(many.assign(noisy), plan, method).reshape(2, every.size, draws) - truth[..., None]
         of = grown.sel(reconstruction=method)
-        for error, sd in zip(along_and_across(*off, record), (of.sd_along, of.sd_across), strict=True):
+        for error, sd in zip(along_and_across(*off.swapaxes(1, 2), record), (of.sd_along, of.sd_across), strict=True):
             ratio = np.sqrt(np.mean(error**2, axis=0)) / sd.values
             assert np.all(np.abs(ratio - 1.0) < 4.5 / np.sqrt(2.0 * draws)), (method, ratio)
 

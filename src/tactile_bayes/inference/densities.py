@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from arviz_stats.base.array import array_stats
 from scipy.linalg import solve_triangular
 from scipy.special import gammaln, logsumexp, ndtr
 
@@ -272,6 +271,8 @@ def weighed(logs: Floats) -> tuple[Floats, Floats]:
 
 def pareto_smoothed(logs: Floats, efficiency: float = 1.0) -> tuple[Floats, float]:
     """Return log-weights of sum one with the largest ones smoothed, and Pareto's k̂, for logs of shape (n,)."""
+    from arviz_stats.base.array import array_stats  # loads Matplotlib
+
     smoothed, k = array_stats.psislw(-logs, r_eff=efficiency)  # weights are exp(−argument)
     return np.asarray(smoothed), float(k)
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from arviz_stats.base.array import array_stats
 from scipy.optimize import brentq
 from scipy.special import expit, log_expit, ndtr
 
@@ -163,6 +162,8 @@ def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
             "density and fit do not overlap: the density is zero at all proposals; its walls may leave little of the "
             "box around the draws"
         )
+    from arviz_stats.base.array import array_stats  # loads Matplotlib
+
     effective = float(drawn.size)
     for _ in range(_ROUNDS):
         threshold = _threshold(drawn, proposed, effective)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import emcee
 import numpy as np
-from arviz_stats.base.array import array_stats
 from scipy.sparse.csgraph import connected_components
 
 from tactile_bayes.arrays import Flags, Floats
@@ -31,6 +30,8 @@ class Diagnosis:
 
     def __init__(self, samples: Floats) -> None:
         """Diagnose samples, shape (chain, step, walker, parameter)."""
+        from arviz_stats.base.array import array_stats  # loads Matplotlib
+
         half = samples.shape[1] // 2
         halves = np.concatenate([samples[:, :half], samples[:, half : 2 * half]])
         self.r_hat = _each(array_stats.rhat, walker_major(halves), method="rank")
@@ -69,6 +70,8 @@ def walker_major(samples: Floats) -> Floats:
 
 def autocorrelation_time(samples: Floats) -> Floats:
     """Return emcee's τ [steps] of samples (chain, step, walker, parameter), all walkers at once, mean over chains."""
+    from arviz_stats.base.array import array_stats  # loads Matplotlib
+
     chains, steps, _, parameters = samples.shape
     if steps < 2:
         return np.full(parameters, np.nan)
