@@ -251,6 +251,7 @@ LARGEST_K = 0.7  # Pareto k̂ above which weights are not reliable (Vehtari et a
 _ADAPTATIONS = 8  # of adaptation, at most
 _DRAWS = 60  # per parameter in each round
 _GOOD = 0.6  # efficiency from which no further round is made
+_TRIED, _HOPELESS = 3, 0.02  # rounds after which none is made if the best is no more efficient
 _MASS_DRAWS = 4000  # from which the mass of a proposal within the bounds is estimated
 _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights are made more equal to reach it
 # Four pieces have the efficiency of eight: 5 to 57 % for seven posteriors along bent ridges that a single one covers to
@@ -284,11 +285,12 @@ def approximate(
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
     ends: Ends = ANYTHING,
+    first: int = 1,
 ) -> Proposal:
     """Approximate a target by rounds of adaptive importance sampling, from guesses at mean and covariance. The most
-    efficient round gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407)."""
+    efficient round, from the `first` on, gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407)."""
     best = proposal = Proposal(centre, WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
-    for _ in range(_ADAPTATIONS):
+    for rounds in range(1, _ADAPTATIONS + 1):
         if deadline.has_passed:
             break
         points, density = proposal.draw(rng, _DRAWS * centre.size)
@@ -296,11 +298,11 @@ def approximate(
         if not np.isfinite(surplus).sum() > _MIN_EFFECTIVE * centre.size:
             break
         efficiency = float(effective_number(normalised(surplus))) / len(points)
-        if efficiency > best.efficiency:
+        if efficiency > best.efficiency and rounds >= first:
             log_mass = float(logsumexp(surplus) - np.log(len(points)))
             log_mass += _log_within(proposal, rng)
             best = replace(proposal, efficiency=efficiency, log_mass=log_mass)
-        if best.efficiency >= _GOOD:
+        if best.efficiency >= _GOOD or (rounds >= _TRIED and best.efficiency < _HOPELESS):
             break
         try:
             proposal = Proposal.fitted(points, flattened(surplus, _MIN_EFFECTIVE * centre.size), ends)

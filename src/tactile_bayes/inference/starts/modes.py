@@ -128,7 +128,8 @@ class Modes:
         if proposal.efficiency <= EFFICIENT:
             guess = square_root(cloud.narrow_covariance)
             middle, root = at_maximum(target, cloud.centre, guess, self.deadline, ends)
-            again = approximate(target, middle, root @ root.T, self.rng, self.deadline, ends)
+            # Draws by the curvature alone may leave out a tail, and seem efficient.
+            again = approximate(target, middle, root @ root.T, self.rng, self.deadline, ends, first=3)
             if again.efficiency > proposal.efficiency:
                 narrow = again.root @ again.root.T / WIDENING**2
                 cloud, proposal = gather(target, again.mean, narrow, self.rng, self.deadline, ends), again
