@@ -164,11 +164,16 @@ def one_cure(task: tuple[tuple[str, str], int]) -> Row:
         numbers = make_replicate(cured, task[1], throw=True).outcome.numbers
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
-    wholes = [numbers.get(f"simultaneous_{region}", math.nan) for region in ("in_gap", "beside")]
-    bands = {region: numbers.get(f"pointwise_{region}", math.nan) for region in ("in_gap", "beside")}
-    whole = float(np.nanmin(wholes)) if np.isfinite(wholes).any() else math.nan
     done = {"check_passed": float(numbers["check_passed"]), "converged": float(numbers["converged"])}
-    return {"conclusion": "", "misfit": True, "first": first, **bands, "whole": whole, **done}
+    return {"conclusion": "", "misfit": True, "first": first, **bands_of(numbers), **done}
+
+
+def bands_of(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return the shares of places at which a band holds in the gap and beside it, and 1 if it does as a whole."""
+    regions = ("in_gap", "beside")
+    wholes = [numbers.get(f"simultaneous_{region}", math.nan) for region in regions]
+    whole = float(np.nanmin(wholes)) if np.isfinite(wholes).any() else math.nan
+    return {**{region: numbers.get(f"pointwise_{region}", math.nan) for region in regions}, "whole": whole}
 
 
 def cells_of_cures(rows: list[Row]) -> list[str]:
@@ -201,15 +206,12 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
         named = [] if numbers["check_passed"] else causes(replicate.posterior).cause.values.tolist()
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
-    wholes = [numbers.get(f"simultaneous_{region}", math.nan) for region in ("in_gap", "beside")]
     return {
         "conclusion": found.attrs["conclusion"],
         "summary": found.attrs["summary"],
         "split_p_value": float(found.split_p_value),
         "check_passed": float(numbers["check_passed"]),
-        "in_gap": numbers.get("pointwise_in_gap", math.nan),
-        "beside": numbers.get("pointwise_beside", math.nan),
-        "whole": float(np.nanmin(wholes)),
+        **bands_of(numbers),
         "rank": math.nan if numbers["check_passed"] else _rank(name, named),
     }
 

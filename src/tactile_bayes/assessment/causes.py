@@ -139,9 +139,9 @@ def causes(posterior: xr.DataTree) -> xr.Dataset:
 def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: Deadline | None = None) -> xr.Dataset:
     """Return the `causes` of an experiment beside its most probable parameters."""
     seen = inspect_record(experiment.record, experiment.rig)
-    misread = [finding for finding in seen.messages if _is_misread(finding)]
+    misread = [finding for finding in seen.messages if _is_misread(finding)][:1]
     if misread and misread[0].kind == "no fit":
-        return _of_readings(misread[:1])
+        return _of_readings(misread)
     tests = _Tests(experiment, found, deadline or Deadline.after(_SECONDS))
     if tests.own.fits and (outliers := [finding for finding in seen.messages if finding.kind == "outlier"]):
         return _of_readings(outliers)  # its optimum bears them, and the posterior does not
@@ -154,7 +154,7 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     better = [f"{row.name} inferred" for row in rows if row.log_evidence > 0.0]
     rows += tests.sought(tests.judged(alternatives_by_channel(experiment, better)))
     if misread and not (tests.own.fits or any(row.describes for row in rows)):  # nothing lies below the pivot
-        return _of_readings(misread[:1])
+        return _of_readings(misread)
     rows.sort(key=lambda row: row.rank)
     columns = {name: ("cause", [getattr(row, name) for row in rows]) for name in COLUMNS_OF_CAUSES}
     attrs = {"described": int(tests.own.fits), "no_time_for": ", ".join(tests.missed)}
