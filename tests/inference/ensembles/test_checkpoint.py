@@ -212,7 +212,7 @@ def test_an_integer_and_its_sequence_are_one_seed(begun):
     assert draw(begun, identity=SAME, seed=np.random.SeedSequence(3)).steps_run == 60
 
 
-ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 2, "steps": 0}
+ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 3, "steps": 0}
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 2, "steps": 0}
         ({"text": "[]"}, "damaged"),
         ({"text": '{"step": 3}'}, "damaged"),
         ({"text": '{"kind": "weights", "format": 1}'}, "'weights'"),
-        ({"text": json.dumps(ENSEMBLES | {"format": 3})}, "format 3"),
+        ({"text": json.dumps(ENSEMBLES | {"format": 4})}, "format 4"),
         ({"text": json.dumps(ENSEMBLES | {"identity": []})}, "damaged"),
         ({"text": json.dumps(ENSEMBLES | {"identity": {}})}, "left out there"),
         ({"identity": SAME | {"version of emcee": "3.1.5"}}, "version of emcee is 3.1.5 there"),

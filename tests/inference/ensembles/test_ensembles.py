@@ -355,7 +355,8 @@ def test_blocks_and_looks_make_no_difference():
     parts = appended(samples, [3, 10, 11, 40], positive).halved()
     for begin, end in ((40, 47), (47, 80), (80, 90)):
         parts = parts.append(as_block(samples[:, begin + 1 : end + 1]))
-    resumed = RunState(positive, as_block(samples[:, :41]), 40, appended(samples, [40], positive).halved().parts)
+    stored = appended(samples, [40], positive).halved()
+    resumed = RunState(positive, as_block(samples[:, :41]), 40, stored.parts, stored.taken_back)
     resumed = resumed.append(as_block(samples[:, 41:]))
     for other in (parts, resumed):
         for one, another in zip(second_half(whole), second_half(other), strict=True):

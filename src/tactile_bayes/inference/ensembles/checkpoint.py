@@ -44,7 +44,7 @@ def identity_of_run(
     }
 
 
-_FILE, _KIND, _FORMAT = "checkpoint.npz", "ensembles of tactile-bayes", 2
+_FILE, _KIND, _FORMAT = "checkpoint.npz", "ensembles of tactile-bayes", 3
 _SECONDS = 5.0  # least time between two files, of up to 32 MB: a killed run makes the steps of this time again
 
 
@@ -81,7 +81,7 @@ class Checkpoint:
             half = StoredSteps(*(arrays[name] for name in ("numbers", "samples", "log_probability", "moved")))
             if places.shape != shape or half.moved.shape[1] != self._steps - self._steps // 2:
                 raise ValueError(f"it has places of shape {places.shape} after {half.moved.shape[1]} steps")
-        return RunState(coordinates, last, self._steps, (half,))
+            return RunState(coordinates, last, self._steps, (half,), arrays["taken_back"])
 
     def write(self, state: RunState, seconds: float, *, is_end: bool = False) -> None:
         """Store a state that was reached after `seconds` [s] of the whole run; if it is no end, only now and then."""
@@ -102,6 +102,7 @@ class Checkpoint:
                 samples=half.samples,
                 log_probability=half.values,
                 moved=half.moved,
+                taken_back=state.taken_back,
             )
         self._steps, self.seconds, self.is_end = state.steps, seconds, is_end
         self._due = time.monotonic() + _SECONDS

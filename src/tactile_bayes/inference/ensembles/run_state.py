@@ -80,13 +80,14 @@ class RunState:
     last: Block  # last block, whose last step determines the next one
     steps: int  # number of steps of each ensemble
     parts: tuple[StoredSteps, ...]  # the second half of the steps at least, in order
+    taken_back: Index  # number of the step after which a walker was last taken back, 0 if never, (chain, walker)
 
     @classmethod
     def begin(cls, coordinates: Coordinates, start: Block) -> RunState:
         """Return the state of a run before its first step."""
         samples, values = start.samples[:, :0], start.log_probability[:, :0]
         empty = StoredSteps(np.empty(0, dtype=np.intp), samples, values, np.empty(values.shape, dtype=bool))
-        return cls(coordinates, start, 0, (empty,))
+        return cls(coordinates, start, 0, (empty,), np.zeros_like(start.log_probability[:, 0], dtype=np.intp))
 
     @property
     def every(self) -> int:
@@ -126,14 +127,18 @@ class RunState:
         (half,) = self.parts
         return half
 
-    def lost(self) -> tuple[Flags, Flags]:
-        """Return True for walkers lost in the earlier and in the later half of the steps kept, (chain, walker) each."""
-        middle = self.half.values.shape[1] // 2
-        return lost_walkers(self.half.values[:, :middle]), lost_walkers(self.half.values[:, middle:])
+    def lost(self) -> Flags:
+        """Return True for walkers that are lost in the later half of the steps kept, (chain, walker)."""
+        return lost_walkers(self.half.values[:, self.half.values.shape[1] // 2 :])
+
+    def were_lost(self) -> Flags:
+        """Return True for walkers with steps kept in which they were lost, (chain, walker)."""
+        earlier = lost_walkers(self.half.values[:, : self.half.values.shape[1] // 2])
+        return earlier | self.lost() | (self.taken_back > self.steps // 2)
 
     def recovered(self) -> RunState:
         """Return the state with few lost walkers taken back to where others were; many that are lost may be a mode."""
-        _, lost = self.lost()
+        lost = self.lost()
         few = lost & (lost.mean(axis=1, keepdims=True) <= _MAX_LOST)
         if not few.any():
             return self
@@ -144,4 +149,4 @@ class RunState:
             there = self.coordinates.of(self.half.samples[chain, 0, others])
             values = self.half.values[chain, 0, others] + self.coordinates.parameters(there)[1]
             last.samples[chain, -1, missing], last.log_probability[chain, -1, missing] = there, values
-        return replace(self, last=last)
+        return replace(self, last=last, taken_back=np.where(few, self.steps, self.taken_back))

@@ -20,7 +20,6 @@ from tactile_bayes.inference.ensembles.diagnosis import (
     Diagnosis,
     Mode,
     autocorrelation_time,
-    lost_walkers,
     modes_message,
     modes_of,
     walker_major,
@@ -195,7 +194,7 @@ class _Run:
         if not self.ending:
             enough = found.satisfies(settings.max_r_hat, settings.min_ess)
             spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.most_steps else ""
-            self.ending = _CONVERGED if enough and not np.any(self.state.lost()) else spent
+            self.ending = _CONVERGED if enough and not np.any(self.state.were_lost()) else spent
         if self.stored is not None and self.ending not in ("", _INTERRUPTED):
             self.stored.write(self.state, self.seconds, is_end=True)
         if self.progress is not None:
@@ -213,7 +212,7 @@ class _Run:
         converged, half = self.ending == _CONVERGED, state.half
         moved = half.moved[:, 1:]  # not in the first step of those kept, before which nothing is known
         stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
-        lost = int(np.count_nonzero(lost_walkers(half.values)))
+        lost = int(np.count_nonzero(state.were_lost()))
         modes = () if converged else modes_of(half.samples, half.values, names)
         message = f"{self.ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {found.message(names)}"
         if not converged:
@@ -223,7 +222,7 @@ class _Run:
             message += f"; {modes_message(modes)}"
         of_walkers = f"of {chains * walkers} walkers"
         if lost:
-            message += f"; {lost} {of_walkers} are where the posterior is improbable: do not use the results"
+            message += f"; {lost} {of_walkers} were where the posterior is improbable: do not use the results"
         if stuck:
             message += f"; {stuck} {of_walkers} did not move in the steps kept: look at their positions"
         return Draws(
