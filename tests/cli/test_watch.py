@@ -291,7 +291,7 @@ def test_control_c_ends_it_with_the_answer(path, as_stated, monkeypatch, rows, m
     monkeypatch.setattr(watching.time, "sleep", lambda seconds: os.kill(os.getpid(), signal.SIGINT))
     result = commands.call("watch", path, "--out", path.parent / "run", "--rig", as_stated, *FEW)
     assert result.exit_code == 0
-    assert "10 samples: stopped by Ctrl-C.\n" in result.stdout
+    assert "10 samples: stopped by Ctrl-C or a signal.\n" in result.stdout
     path.unlink()
     result = commands.call("watch", path, "--out", path.parent / "other", "--rig", as_stated, *FEW)
     assert result.exit_code == 130

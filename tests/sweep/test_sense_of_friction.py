@@ -79,7 +79,9 @@ def test_scan_many_has_the_same_phases():
     assert many.phases.values[1].startswith("A-a-A")
 
 
-@pytest.mark.parametrize("seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 206))])
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=() if seed in (1, 72, 195) else pytest.mark.slow) for seed in range(206)]
+)
 def test_any_rod_on_any_drive_is_where_small_steps_lead(seed):
     """Drives that turn back up to twice; friction up to 0.8."""
     case = drawn_case(np.random.default_rng(seed))

@@ -251,14 +251,14 @@ LARGEST_K = 0.7  # Pareto k̂ above which weights are not reliable (Vehtari et a
 _ADAPTATIONS = 8  # of adaptation, at most
 _DRAWS = 60  # per parameter in each round
 _GOOD = 0.6  # efficiency from which no further round is made
-_TRIED, _HOPELESS = 3, 0.02  # rounds after which none is made if the best is no more efficient
+_TRIED, _HOPELESS = 3, 0.02  # rounds that count after which none is made if the best is no more efficient
 _MASS_DRAWS = 4000  # from which the mass of a proposal within the bounds is estimated
 _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights are made more equal to reach it
 # Four pieces have the efficiency of eight: 5 to 57 % for seven posteriors along bent ridges that a single one covers to
 # 1 to 10 %. After the fewest rounds an efficiency that is enough is no luck; after the usual number, little is gained
 # unless some of the last rounds were better than all before.
 _PIECES, _FEWEST, _USUAL, _IN_VAIN, _MOST, _ENOUGH = 4, 4, 16, 6, 24, 0.5
-_BENT = 0.25  # efficiency of a single proposal below which pieces are tried: along bent ridges it is seldom more
+BENT = 0.25  # efficiency of a single proposal below which pieces are tried: along bent ridges it is seldom more
 EFFICIENT = 0.35  # efficiency of a proposal above which ensembles converge in some hundred steps
 _DRAWS_OF_PIECES = 120  # per parameter in each of these rounds
 
@@ -302,7 +302,7 @@ def approximate(
             log_mass = float(logsumexp(surplus) - np.log(len(points)))
             log_mass += _log_within(proposal, rng)
             best = replace(proposal, efficiency=efficiency, log_mass=log_mass)
-        if best.efficiency >= _GOOD or (rounds >= _TRIED and best.efficiency < _HOPELESS):
+        if best.efficiency >= _GOOD or (rounds - first >= _TRIED - 1 and best.efficiency < _HOPELESS):
             break
         try:
             proposal = Proposal.fitted(points, flattened(surplus, _MIN_EFFECTIVE * centre.size), ends)
@@ -374,7 +374,7 @@ def refined(
     size, best, since = proposal.mean.size, 0.0, 0
     mixture, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()
     points, values = np.empty((0, size)), np.empty(0)
-    while proposal.efficiency < _BENT and len(rounds) < _MOST and not deadline.has_passed:
+    while proposal.efficiency < BENT and len(rounds) < _MOST and not deadline.has_passed:
         drawn, density = mixture.draw(rng, _DRAWS_OF_PIECES * size)
         found = log_probability(drawn)
         efficiency = float(effective_number(normalised(found - density))) / len(drawn)

@@ -187,7 +187,7 @@ def test_a_log_probability_that_is_no_number_is_refused_with_the_point(bad, caps
 
 def test_walkers_of_a_target():
     assert SamplerSettings().walkers_for(2) == 48
-    assert SamplerSettings().walkers_for(15) == 90
+    assert [SamplerSettings().walkers_for(size) for size in (9, 14, 20, 41)] == [54, 84, 84, 124]
     assert SamplerSettings(walkers=20).walkers_for(10) == 20
     with refused(ParameterError, 22):
         SamplerSettings(walkers=20).walkers_for(11)

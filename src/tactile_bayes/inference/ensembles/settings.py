@@ -21,9 +21,9 @@ class SamplerSettings:
     ensembles : int
         Number of independent ensembles, the chains of the result.
     walkers : int, optional
-        Number of walkers of each ensemble, even and at least twice the number of parameters. By default the larger of
-        48 and six times the number of parameters: the effective draws per evaluation hardly depend on it, and more of
-        them are faster, but each has to forget its start.
+        Number of walkers of each ensemble, even and at least twice the number of parameters. By default six times the
+        number of parameters, between 48 and 84, and at least three times: the effective draws per evaluation hardly
+        depend on it, and more of them are faster, but each has to forget its start.
     block_steps : int
         Number of steps before the first diagnosis, and the smallest number between later ones, which come when the
         steps have grown by a quarter.
@@ -93,7 +93,7 @@ class SamplerSettings:
         """Return the number of walkers of each ensemble for a target of this many parameters."""
         check_whole_number("parameters", parameters, 1)
         if self.walkers is None:
-            return max(48, 6 * parameters)
+            return max(48, min(6 * parameters, 84), 3 * parameters + parameters % 2)
         if self.walkers < 2 * parameters:
             raise ParameterError(
                 f"{self.walkers} walkers for {parameters} parameters: give at least {2 * parameters}, or the proposals "

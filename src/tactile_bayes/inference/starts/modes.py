@@ -11,7 +11,16 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Coordinates, FlankCoordinates, in_coordinates
 from tactile_bayes.inference.deadline import Deadline
-from tactile_bayes.inference.densities import ANYTHING, EFFICIENT, WIDENING, Ends, Proposal, approximate, at_maximum
+from tactile_bayes.inference.densities import (
+    ANYTHING,
+    BENT,
+    EFFICIENT,
+    WIDENING,
+    Ends,
+    Proposal,
+    approximate,
+    at_maximum,
+)
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather, square_root
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, are_alike, optima_of
@@ -28,6 +37,8 @@ _OTHER_FLANK = 0.1
 _MAX_EXCESS_COST = 100.0  # above the smallest cost, from which an optimum is disregarded
 _MODE_RADIUS = 3.0  # distance from a mode, over that of typical points of its proposal, within which an optimum is its
 _MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw in ten thousand
+# First round that counts of an adaptation from the curvature, whose own draws may leave out a tail, and seem efficient.
+_BY_CURVATURE = 3
 _EXTENT_DRAWS = 500  # from which the extent of a proposal is estimated
 
 
@@ -123,13 +134,16 @@ class Modes:
         self, coordinates: Coordinates, optimum: ContourOptimum, covariance: Floats, ends: Ends = ANYTHING
     ) -> PosteriorMode:
         target, centre = in_coordinates(self.model.log_probability, coordinates), coordinates.of(optimum.point[None])[0]
+        first, poor = 1, EFFICIENT
+        if self.model.noise.of_discrepancy:  # which makes residuals alike, as the search does not know
+            centre, root = at_maximum(target, centre, square_root(covariance), self.deadline, ends)
+            covariance, first, poor = root @ root.T, _BY_CURVATURE, BENT
         cloud = gather(target, centre, covariance, self.rng, self.deadline, ends)
-        proposal = approximate(target, cloud.centre, cloud.narrow_covariance, self.rng, self.deadline, ends)
-        if proposal.efficiency <= EFFICIENT:
+        proposal = approximate(target, cloud.centre, cloud.narrow_covariance, self.rng, self.deadline, ends, first)
+        if proposal.efficiency <= poor:
             guess = square_root(cloud.narrow_covariance)
             middle, root = at_maximum(target, cloud.centre, guess, self.deadline, ends)
-            # Draws by the curvature alone may leave out a tail, and seem efficient.
-            again = approximate(target, middle, root @ root.T, self.rng, self.deadline, ends, first=3)
+            again = approximate(target, middle, root @ root.T, self.rng, self.deadline, ends, _BY_CURVATURE)
             if again.efficiency > proposal.efficiency:
                 narrow = again.root @ again.root.T / WIDENING**2
                 cloud, proposal = gather(target, again.mean, narrow, self.rng, self.deadline, ends), again

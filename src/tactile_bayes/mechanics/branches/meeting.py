@@ -175,12 +175,12 @@ def go_on(here: Here, setting: Setting, step: LegStep, met: Meeting, event: Any,
         if now.at.force < _FAINT or (passes and is_before_record(there.scene.line, now.travel)):
             back = slid_back(there)
             passes = passes and is_before_record(there.scene.line, 2.0 * back.begin.travel - now.travel)
-            if math.isfinite(back.begin.at.p) and (now.at.force < _FAINT or passes):
+            if is_brief(now, back.begin) if now.at.force < _FAINT and not passes else math.isfinite(back.begin.at.p):
                 return back
     is_held, there = in_mode(there, met.kind == _MODE)
     if not is_held and not slides(here.scene.phase):
         there = slid_back(here)
-        is_held = math.isfinite(there.begin.at.p)
+        is_held = is_brief(here.begin, there.begin)
     if not is_held:
         event.snap_off = _JUMP
         return _stopped(here)
@@ -236,6 +236,12 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
     if was_sliding:
         return sense * along.q <= NOT_SLIPPING, there
     return sense * slip(scene, begin.at, along) <= _UNCLEAR, there
+
+
+@inlined
+def is_brief(stick: Balance, slip: Balance) -> bool:
+    """Return True if a contact that sticks slips back, if at all, so soon that rounding may hide it."""
+    return abs(slip.travel - stick.travel) < _HIDDEN
 
 
 @compiled
