@@ -379,3 +379,14 @@ def test_few_lost_walkers_are_taken_back_and_many_stay(count, stay):
     np.testing.assert_array_equal(last.samples[:, :-1], samples[:, :-1])
     if not stay:
         np.testing.assert_array_equal(last.log_probability[0, -1], -0.5 * last.samples[0, -1, :, 0] ** 2)
+
+
+@pytest.mark.parametrize(("step", "lost"), [(0, 0), (10, 0), (11, 1), (20, 1)])
+def test_a_walker_was_lost_while_a_step_before_it_was_taken_back_is_kept(step, lost):
+    """Of 20 steps, whose second half is kept."""
+    samples = np.random.default_rng(1).normal(size=(2, 20, 48, 1))
+    values = -0.5 * samples[..., 0] ** 2
+    state = RunState.begin(Coordinates(), Block(samples[:, :1], values[:, :1], ()))
+    state = state.append(Block(samples, values, ())).halved()
+    state.taken_back[0, 5] = step
+    assert np.count_nonzero(state.were_lost()) == lost
