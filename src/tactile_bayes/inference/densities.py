@@ -251,7 +251,7 @@ LARGEST_K = 0.7  # Pareto k̂ above which weights are not reliable (Vehtari et a
 _ADAPTATIONS = 8  # of adaptation, at most
 _DRAWS = 60  # per parameter in each round
 _GOOD = 0.6  # efficiency from which no further round is made
-_TRIED, _HOPELESS = 3, 0.02  # rounds that count after which none is made if the best is no more efficient
+_TRIED, _HOPELESS = 3, 0.02  # rounds after which none is made if the best is no more efficient
 _MASS_DRAWS = 4000  # from which the mass of a proposal within the bounds is estimated
 _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights are made more equal to reach it
 # Four pieces have the efficiency of eight: 5 to 57 % for seven posteriors along bent ridges that a single one covers to
@@ -302,7 +302,7 @@ def approximate(
             log_mass = float(logsumexp(surplus) - np.log(len(points)))
             log_mass += _log_within(proposal, rng)
             best = replace(proposal, efficiency=efficiency, log_mass=log_mass)
-        if best.efficiency >= _GOOD or (rounds - first >= _TRIED - 1 and best.efficiency < _HOPELESS):
+        if best.efficiency >= _GOOD or (rounds >= _TRIED and best.efficiency < _HOPELESS):
             break
         try:
             proposal = Proposal.fitted(points, flattened(surplus, _MIN_EFFECTIVE * centre.size), ends)

@@ -175,7 +175,8 @@ def go_on(here: Here, setting: Setting, step: LegStep, met: Meeting, event: Any,
         if now.at.force < _FAINT or (passes and is_before_record(there.scene.line, now.travel)):
             back = slid_back(there)
             passes = passes and is_before_record(there.scene.line, 2.0 * back.begin.travel - now.travel)
-            if is_brief(now, back.begin) if now.at.force < _FAINT and not passes else math.isfinite(back.begin.at.p):
+            is_hidden = now.at.force < _FAINT and is_brief(now, back.begin)
+            if is_hidden or (passes and math.isfinite(back.begin.at.p)):
                 return back
     is_held, there = in_mode(there, met.kind == _MODE)
     if not is_held and not slides(here.scene.phase):
