@@ -23,7 +23,7 @@ from helpers.contour_posteriors import (
     without,
 )
 from helpers.refusals import refused
-from tactile_bayes import Family, LoadCell, Rig, Rod, SamplerSettings, Translation, infer_contour, scan
+from tactile_bayes import Family, LoadCell, Rig, Rod, SamplerSettings, Translation, check, infer_contour, scan
 from tactile_bayes.contours import Circle, Ellipse, Parabola
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
@@ -333,6 +333,16 @@ def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
     clock.now = 0.0
     infer_contour(measured(), settings=replace(settings, max_steps=1, max_seconds=None), **draw)
     assert drawn[0] <= drawn[1] - (seconds < 1.0)  # with all the time it wants
+
+
+@pytest.mark.parametrize("family", ["parabola", pytest.param("shape-free", marks=pytest.mark.slow)])
+def test_of_what_is_not_described_no_more_is_sampled_than_a_verdict_needs(family):
+    real = Rig(load_cell=CELL, unknown={"friction": 0.5})
+    record = real.measure(scan(Parabola(**TRUTH), real, drive_step=0.05).record, rng=1)
+    result = infer_contour(record, family=family, rig=Rig(load_cell=CELL, unknown="nothing"), rng=1)
+    assert result["sample_stats"].attrs["steps_run"] == 50
+    assert result.attrs["converged"] == 0
+    assert [one.kind for one in check(result).messages[:1]] == ["not described"]
 
 
 def test_a_posterior_is_kept_before_anything_is_made_of_it(monkeypatch):

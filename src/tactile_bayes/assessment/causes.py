@@ -79,10 +79,12 @@ def with_bends(model: ContourModel, places: tuple[float, ...]) -> ContourModel:
 
 
 COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
-_SECONDS = 120.0  # time limit of all searches [s], each of which takes about one
+_SECONDS = 45.0  # time limit of all searches [s], each of which takes about one, and shape-free four
 _FEWEST = 4  # causes that are sought at least, the likeliest first; then until one describes the record
 _LEAST = 0.03  # share of the log-evidence of what describes the record below which, to first order, nothing is sought
-_MOST = 0.5  # least share of what any shape explains that one spot explains, to be named in its place
+# Least share of what any shape explains that one spot explains, to be named in its place; and of the log-evidence of
+# what describes the record, for a shape that does not.
+_MOST = 0.5
 _PRICE = float(np.log(len(PLACES)))  # of the places at which a spot is sought, in log-evidence
 _SHAPE_FREE, _FLAT_SIDED = "family shape-free", "family flat-sided"
 
@@ -93,7 +95,7 @@ def causes(posterior: xr.DataTree) -> xr.Dataset:
     Each unknown of the rig that is not inferred is added, a spot that is flatter or more bent is put anywhere along the
     contour, and each other family is taken. First all are judged by score tests, the derivatives of the loads at the
     most probable parameters, in milliseconds; then of the likeliest the most probable parameters are sought again,
-    about a second each, until one describes the record, for two minutes at most. Nothing is sampled.
+    about a second each, until one describes the record, for 45 s at most. Nothing is sampled.
 
     Parameters
     ----------
@@ -148,7 +150,7 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     every = [each for each in alternatives_of(experiment, seen) if each.kind != "fixed"]
     shape, spot = tests.any_shape()
     rows = tests.sought(tests.judged([each for each in every if each.kind == "added"]) + shape)
-    if any(row.is_shape and row.log_evidence >= _LEAST * tests.known for row in rows[:2]):
+    if any(row.is_shape and row.log_evidence >= _least(row) * tests.known for row in rows[:2]):
         rows = [tests.placed(row, spot) if row.is_shape else row for row in rows]
         rows += tests.sought(tests.judged([e for e in every if e.kind == "family" and e.name != _SHAPE_FREE]))
     better = [f"{row.name} inferred" for row in rows if row.log_evidence > 0.0]
@@ -212,7 +214,7 @@ class _Tests:
                     for name in set(self.model.forward_parameters) - set(model.forward_parameters):
                         start |= dict.fromkeys(added, start[name])  # gains in place of the scale of rigidity
                     (step,) = first_order(model, start, [added])
-                    gain, starts = step.log_evidence, [step.start, *starts]
+                    gain, starts = step.log_evidence, [step.start, *starts[1:]]
                 name, is_shape = each.name.replace(" inferred", ""), each.kind == "family"
                 more = 0.0
                 if model.unknowns.memory and not self.model.unknowns.memory:
@@ -276,6 +278,11 @@ class _Tests:
             if np.isfinite(each.log_evidence):
                 rows.append(each)
         return sorted(rows, key=lambda row: row.rank)
+
+
+def _least(shape: _Cause) -> float:
+    """Return the share of the log-evidence of what describes the record from which a shape is looked at closely."""
+    return _LEAST if shape.describes else _MOST
 
 
 def _is_misread(finding: Finding) -> bool:

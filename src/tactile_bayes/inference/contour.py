@@ -31,7 +31,6 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import expanded
 
-_STEPS_OF_A_VERDICT = 50  # of a posterior whose best parameters do not describe the record
 _PRIOR_SECONDS = 3.0  # time limit for draws from the prior [s] if time is limited, since a rod may reach few contours
 
 
@@ -243,8 +242,8 @@ def sampled(
             problem, walk = _likeliest(problem, seeds[0], settings, NEVER if checkpoint is not None else deadline)
         model = problem.model
         refuse_beyond(model, walk)
-        is_brief = walk.is_hopeless and settings.max_steps is None
-        steps = _STEPS_OF_A_VERDICT if is_brief else settings.max_steps
+        is_brief = walk.most_steps is not None and settings.max_steps is None
+        steps = walk.most_steps if is_brief else settings.max_steps
         draws = sample(
             model.log_probability,
             walk.start,
@@ -258,7 +257,7 @@ def sampled(
         )
         tree = xr.DataTree.from_dict(drawn_groups(model, draws))
         tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
-        if is_brief and not draws.converged:
+        if is_brief and not draws.converged and draws.steps_run == steps:
             tree.attrs["message"] += "; no more are made where the best parameters leave what no noise explains"
         if "blocks" in tree.attrs:
             tree.attrs["message"] += f"; the likelihood takes {tree.attrs['blocks']}"

@@ -70,6 +70,11 @@ def optima(
             break
 
 
+def robust_cost(residuals: Floats) -> Floats:
+    """Return the cost of residuals, (n, k), that grows linearly beyond the threshold; shape (n,)."""
+    return np.asarray(HUBER_THRESHOLD**2 * np.sum(np.hypot(1.0, residuals / HUBER_THRESHOLD) - 1.0, axis=1))
+
+
 def descend(
     residuals: Residuals,
     start: Floats,

@@ -15,6 +15,7 @@ from tactile_bayes.inference.shape_free_posterior.normal_approximation import An
 from tactile_bayes.inference.shape_free_posterior.observations import Observer, linear_names
 from tactile_bayes.inference.shape_free_posterior.whitening import _linear_prior, whitening_at
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
+from tactile_bayes.inference.starts.contour_start import mean_square_left
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.rig_prior import RigPrior
 
@@ -244,6 +245,16 @@ def test_what_may_vanish_does_not_end_the_coordinates():
     ahead, behind = (whitening.parameters(there[3] + sign * steps)[0] for sign in (1.0, -1.0))
     _, determinant = np.linalg.slogdet((ahead - behind) / 2e-5)
     assert growth[3] == pytest.approx(determinant, abs=1e-4)
+
+
+def test_the_record_is_seen_where_friction_has_all_but_vanished():
+    """From there a step to less leads below zero, where there are no loads."""
+    model = model_of(RUBBING)
+    point = whitened(model).centre
+    point[np.flatnonzero(model.may_vanish)] = 1e-9
+    found = whitening_at(model, point, np.random.default_rng(1)).centre
+    assert model.log_probability(found[None]) > model.log_probability(point[None]) - 1.0
+    assert mean_square_left(model, found) < 1.2
 
 
 def test_time_that_ends_before_anything_possible_is_found_gives_what_the_prior_allows():

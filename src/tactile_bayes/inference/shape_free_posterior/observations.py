@@ -141,6 +141,8 @@ def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: F
     nodes, rig = family.radius.nodes, linear_names(model)[prior.mean.size - len(model.unknowns.names) :]
     first_of_rig = centre.size - len(rig)
     units = np.append(np.ones(nodes), prior.deviation[nodes - centre.size :])
+    vanishing = slice(centre.size - int(np.count_nonzero(model.may_vanish)), None)  # and no step leads below zero
+    centre = np.append(centre[: vanishing.start], np.maximum(centre[vanishing], _LARGEST_STEP * units[vanishing]))
     noises = scales[white_scales(model)]
 
     def differences(axes: Floats, steps: Floats) -> tuple[list[_Lines], list[float]]:

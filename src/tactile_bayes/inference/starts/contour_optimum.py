@@ -14,7 +14,15 @@ from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.least_squares import HUBER_THRESHOLD, STEP, Optimum, Residuals, descend, optima
+from tactile_bayes.inference.least_squares import (
+    HUBER_THRESHOLD,
+    STEP,
+    Optimum,
+    Residuals,
+    descend,
+    optima,
+    robust_cost,
+)
 from tactile_bayes.inference.misfit import is_inferred
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.differences import central_slopes
@@ -28,6 +36,7 @@ _PRIOR_DRAWS = 1000
 _PRIOR_QUANTILES = 25
 _STEP_OF_ADDED = 0.2  # of the differences by a parameter that is added, in prior standard deviations
 _FARTHEST = 2.0  # longest step to first order, in prior standard deviations of a parameter
+_SHARES = np.array([1.0, 0.5, 0.25, 0.1, 0.0])  # of that step, of which the best is taken
 _CANDIDATES = 24  # most prior draws from which searches begin, the likeliest first: from too far away they stop early
 _SMOOTH_STARTS = 6  # of these from which contours without roughness are sought
 _EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
@@ -97,12 +106,14 @@ def event_brackets(model: ContourModel) -> Brackets:
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
 
 
-def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
+def optimum_of(
+    model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER, most: int = _MAX_TRIED
+) -> ContourOptimum:
     """Return the first optimum of `optima_of` that explains the record, or else the best of the first ones."""
     tried: list[ContourOptimum] = []
     for found in optima_of(model, rng, deadline):
         tried.append(found)
-        if found.fits or len(tried) == _MAX_TRIED or are_alike(tried):
+        if found.fits or len(tried) == most or are_alike(tried):
             break
     if not tried:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
@@ -143,9 +154,9 @@ def smooth_optimum(model: ContourModel, rng: np.random.Generator, deadline: Dead
 
 def cost_of_residuals(model: ContourModel, start: Mapping[str, float]) -> float:
     """Return the robust cost of a record's residuals at parameters by name."""
-    search, threshold = _Search(model, _prior_quantiles(model), NEVER), HUBER_THRESHOLD
-    residuals = search.residuals(search.coordinates.of(search.named(start)[None]))[0]
-    return float(threshold**2 * np.sum(np.hypot(1.0, residuals / threshold) - 1.0))
+    search = _Search(model, _prior_quantiles(model), NEVER)
+    coordinates = search.coordinates.of(search.named(start)[None])
+    return float(robust_cost(search.residuals(coordinates))[0])
 
 
 class FirstOrder(NamedTuple):
@@ -191,9 +202,9 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
         alone = np.linalg.solve(precision[np.ix_(own, own)], score[own])
         gain = 0.5 * (score[both] @ step - score[own] @ alone)
         of_both, of_own = (np.linalg.slogdet(precision[np.ix_(some, some)]).logabsdet for some in (both, own))
-        moved = place.copy()
-        moved[both] += np.clip(step, -_FARTHEST, _FARTHEST)
-        point = search.points((moved * search.spread)[None])[0]
+        moved = np.tile(place, (_SHARES.size, 1))
+        moved[:, both] += _SHARES[:, None] * np.clip(step, -_FARTHEST, _FARTHEST)
+        point = search.points(moved * search.spread)[np.argmin(search.costs(moved * search.spread))]
         found.append(FirstOrder(float(gain - 0.5 * (of_both - of_own)), dict(zip(names, point.tolist(), strict=True))))
     return found
 
@@ -263,15 +274,21 @@ class _Search:
             late[allowed] = self.brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
+    def costs(self, coordinates: Floats) -> Floats:
+        """Return the robust costs of residuals and priors, (n,)."""
+        of_prior = np.square((coordinates - self.middle) / self.spread).sum(axis=1)
+        return robust_cost(self.residuals(coordinates)) + 0.5 * of_prior
+
     def beside(self, starts: Sequence[Mapping[str, float]]) -> Iterator[Floats]:
         """Yield coordinates of starts, where medians stand for what they do not name, and of the contour fitted to Step
         2's contacts, with the rig's medians and without."""
+        of_contour = [start for start in starts if set(self.model.family.parameters) <= set(start)]
+        yield from (self.coordinates.of(self.named(start)) for start in of_contour)
         rig = dict(zip(self.model.forward_parameters, self.usual.tolist(), strict=True))
         contacts = [fitted for fitted in (self._at_contacts(), self._at_contacts(rig)) if fitted is not None]
-        for start in starts:
-            if not contacts or set(self.model.family.parameters) <= set(start):
-                yield self.coordinates.of(self.named(start))
         yield from contacts
+        if not (of_contour or contacts):
+            yield from (self.coordinates.of(self.named(start)) for start in starts)
 
     def starts(self) -> Iterator[Floats]:
         """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""

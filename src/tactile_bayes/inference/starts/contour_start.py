@@ -24,13 +24,7 @@ from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.observations import Observer
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening, whitening_at
 from tactile_bayes.inference.starts.cloud import gather
-from tactile_bayes.inference.starts.contour_optimum import (
-    ContourOptimum,
-    contact_fit,
-    fitted_noise,
-    optimum_of,
-    smooth_optimum,
-)
+from tactile_bayes.inference.starts.contour_optimum import contact_fit, fitted_noise, optimum_of, smooth_optimum
 from tactile_bayes.inference.starts.modes import Modes
 from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
@@ -40,8 +34,12 @@ from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
+_SEARCHES = 3  # for an optimum, if these draws do not lead to a mode, either
 _FARTHEST = 5.0  # standard deviations at which residuals are clipped: a sample beside an event may be loaded or not
-_SMOOTH = 2.5  # root mean square of a channel's residuals, over the noise between neighbours, that no noise explains
+# Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, or only one that
+# is alike in neighbours; and the steps that a verdict needs.
+_SMOOTH, _STEPS_OF_A_VERDICT = 2.5, 50
+_ALIKE, _STEPS_IN_DOUBT = 1.4, 300
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
 
 
@@ -52,7 +50,7 @@ class Walk(NamedTuple):
     coordinates: Coordinates
     log_evidence: float = -np.inf  # coarse one of the model, up to a constant of the number of parameters
     beyond: str = ""  # parameters that fit the record far better beyond the ends of their priors, as text
-    is_hopeless: bool = False  # whether what the best mode leaves is no noise
+    most_steps: int | None = None  # those of a verdict, if what the best mode leaves is no noise
 
 
 def walk_of(
@@ -106,17 +104,18 @@ class _Start(NamedTuple):
     def _starting_points(self) -> Iterator[Iterable[Floats]]:
         """Yield parameters fitted to Step 2's contacts and the likeliest draws of the prior, or without contacts
         those of a circle, and at last those of a search."""
-        model = self.model
+        model, rng, deadline = self.model, self.rng, self.deadline
         by_contacts = contact_fit(model)
-        if by_contacts is not None:
-            of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
-            of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
-            yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
-            drawn, _ = model.draw_prior(self.rng, _PRIOR_DRAWS, self.deadline)
-            yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
-        else:
-            yield [smooth_optimum(model, self.rng, self.deadline)]
-        yield [optimum_of(model, self.rng, self.deadline).point]
+        if by_contacts is None:
+            yield [smooth_optimum(model, rng, deadline)]
+            yield [optimum_of(model, rng, deadline).point]
+            return
+        of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
+        of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
+        yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
+        drawn, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
+        yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
+        yield [optimum_of(model, rng, deadline, _SEARCHES).point]
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
         """Return the start around a centre, in whitening coordinates."""
@@ -141,10 +140,12 @@ class _Start(NamedTuple):
         )
         # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
         log_evidence = float(log_probability(whitening.middle[None])[0])
-        if not noise.of_discrepancy:
+        left = _left_over_noise(self.model, whitening.centre)
+        most_steps = _STEPS_OF_A_VERDICT if left > _SMOOTH else _STEPS_IN_DOUBT if left > _ALIKE else None
+        if not (noise.of_discrepancy or left > _SMOOTH):  # else a verdict does not need it
             rest = slice(whitening.bent, None)
             whitening, start = standardise(self.model.log_probability, whitening, start, rest, self.rng, deadline)
-        return Walk(start, whitening, log_evidence)
+        return Walk(start, whitening, log_evidence, most_steps=most_steps)
 
     def scattered(self) -> Walk:
         """Return walkers scattered twice as widely as normal approximations of the modes, which serve as proposals."""
@@ -155,7 +156,7 @@ class _Start(NamedTuple):
         common = modes[0].coordinates
         target = in_coordinates(model.log_probability, common)
         first = modes[0].optimum
-        is_hopeless = _is_hopeless(model, first)
+        is_hopeless = not first.fits and _left_over_noise(model, first.point) > _SMOOTH
         proposal = Mixture(tuple(mode.proposal for mode in modes))
         shares = proposal.shares
         if not is_hopeless:  # else a verdict does not need it
@@ -181,7 +182,8 @@ class _Start(NamedTuple):
             raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
         coordinates = replace(common, proposal=proposal)
         log_evidence = float(logsumexp([part.log_mass for part in proposal.parts]))
-        return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, is_hopeless)
+        most_steps = _STEPS_OF_A_VERDICT if is_hopeless else None
+        return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, most_steps)
 
 
 def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:
@@ -193,14 +195,15 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
     )
 
 
-def _is_hopeless(model: ContourModel, best: ContourOptimum) -> bool:
-    """Return True if the residuals of some channel are far larger than the noise between neighbouring ones."""
+def _left_over_noise(model: ContourModel, best: Floats) -> float:
+    """Return the largest root mean square of a channel's residuals at the best parameters, over the noise between
+    neighbouring ones; 0 if what wanders, or is off by what is integrated out, is inferred, which is no misfit."""
     cell = model.noise.cell
-    if best.fits or model.noise.of_discrepancy or cell.drift is not None or any(cell.bias_uncertainty):
-        return False  # what wanders, or is off by what is integrated out, is no misfit
-    left, noise = _residuals(model, best.point)[:, model.present], model.deviation[model.present]
+    if model.noise.of_discrepancy or cell.drift is not None or any(cell.bias_uncertainty):
+        return 0.0
+    left, noise = _residuals(model, best)[:, model.present], model.deviation[model.present]
     rough = np.maximum([rough_noise(channel) for channel in left.T], noise)
-    return bool(np.any(np.sqrt(np.mean(np.minimum(np.abs(left / rough), _FARTHEST) ** 2, axis=0)) > _SMOOTH))
+    return float(np.sqrt(np.mean(np.minimum(np.abs(left / rough), _FARTHEST) ** 2, axis=0)).max())
 
 
 def _residuals(model: ContourModel, point: Floats) -> Floats:
