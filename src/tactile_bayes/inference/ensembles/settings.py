@@ -23,7 +23,8 @@ class SamplerSettings:
     walkers : int, optional
         Number of walkers of each ensemble, even and at least twice the number of parameters. By default six times the
         number of parameters, between 48 and 84, and at least three times: the effective draws per evaluation hardly
-        depend on it, and more of them are faster, but each has to forget its start.
+        depend on it, and more of them are faster, but each has to forget its start. A shape-free contour, whose
+        coordinates are nearly normal, has twice the number of parameters.
     block_steps : int
         Number of steps before the first diagnosis, and the smallest number between later ones, which come when the
         steps have grown by a quarter.
