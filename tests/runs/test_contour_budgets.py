@@ -17,8 +17,8 @@ from tactile_bayes.sweep import scan
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="there is no wait4")]
 
 SECONDS = 20  # time that is given
-# Processor time beside it [s]: of compilers, if these have not run before, of the search for causes, which has a limit
-# of its own, and of all that is not bounded.
+# Processor time beside it [s]: of compilers, if these have not run before, of the search for what is wrong with a model
+# that does not describe the record, which has a limit of its own, and of all that is not bounded.
 COMPILERS, CAUSES, ALLOWANCE = 45.0, 60.0, 25.0
 
 
@@ -47,15 +47,15 @@ def record_of(contour: Contour, samples: int) -> xr.Dataset:
 
 
 @pytest.mark.parametrize(
-    ("shape", "samples", "family", "gigabytes"),
+    ("shape", "samples", "family", "gigabytes", "causes"),
     [
-        ("superellipse", 500, "shape-free", 2.0),
-        ("hyperbola", 500, "shape-free", 2.0),
-        ("parabola", 12_000, "parabola", 1.0),
-        ("parabola", 12_000, "shape-free", 1.0),
+        ("superellipse", 500, "shape-free", 2.0, CAUSES),
+        ("hyperbola", 500, "shape-free", 2.0, 0.0),
+        ("parabola", 12_000, "parabola", 1.0, 0.0),
+        ("parabola", 12_000, "shape-free", 1.0, 0.0),
     ],
 )
-def test_a_run_keeps_its_time_and_its_memory(shape, samples, family, gigabytes, tmp_path):
+def test_a_run_keeps_its_time_and_its_memory(shape, samples, family, gigabytes, causes, tmp_path):
     write_record(record_of(SHAPES[shape](), samples), tmp_path / "record.csv")
     command = f"infer record.csv --out run --family {family} --max-seconds {SECONDS} --quiet".split()
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -73,4 +73,4 @@ def test_a_run_keeps_its_time_and_its_memory(shape, samples, family, gigabytes, 
     assert (tmp_path / "run" / "band.csv").exists()
     assert peak < gigabytes * 1e9
     # Processor time, for on a machine that others use, too, the clock says little of what comes after the time given.
-    assert spent < SECONDS + COMPILERS + CAUSES + ALLOWANCE
+    assert spent < SECONDS + COMPILERS + causes + ALLOWANCE
