@@ -21,7 +21,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
 # First and last version of numba whose internals `parts` was tried with. Beyond them functions are compiled by its
-# public options alone: the same results, but compiling for the first use takes 60 s of CPU in place of 27.
+# public options alone: the same results, but compiling for the first use takes twice as long.
 _KNOWN = (0, 61), (0, 68)
 _OF_PARTS: dict[str, Any] = {}
 if _KNOWN[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= _KNOWN[1]:

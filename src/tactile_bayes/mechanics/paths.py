@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
+from tactile_bayes.mechanics.branches.line import NO_LINES
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.branches.sweeps import Segments, Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.elastica import Wrench
@@ -220,6 +221,7 @@ def _swept(
     segments, each = angles.shape
     sweeps = sweeps._replace(segment=sweeps.contour % segments)
     sorted_angles = np.take_along_axis(angles, order, axis=1)
+    lines = NO_LINES if lines is None else lines
     asked = Segments(each * np.arange(segments + 1), order.ravel(), sorted_angles.ravel(), lines, relative)
     return solve_sweeps(shapes, sweeps, asked, (sweeps.contour.size, each), **options)
 

@@ -10,7 +10,7 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.discrepancy import Course
-from tactile_bayes.mechanics.branches.line import LINE_COLUMNS, lines_through, turned_in
+from tactile_bayes.mechanics.branches.line import LINE_COLUMNS, NO_LINES, lines_through, turned_in
 from tactile_bayes.mechanics.branches.sweeps import Segments
 from tactile_bayes.reconstruction import contact_sides, drive_histories, least_turn
 from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of
@@ -160,7 +160,8 @@ class RecordSegments:
                 angles.append(shifted[order])
                 samples.append((own + self.drive_angles.size * np.arange(errors.size)[:, None]).ravel()[order])
             first = np.cumsum([0, *(part.size for part in samples)])
-            self._samples_by_errors[key] = Segments(first, np.concatenate(samples), np.concatenate(angles), self.lines)
+            lines = NO_LINES if self.lines is None else self.lines
+            self._samples_by_errors[key] = Segments(first, np.concatenate(samples), np.concatenate(angles), lines)
         return self._samples_by_errors[key]
 
 

@@ -52,7 +52,7 @@ _RESOLVED_LOADS = 1e-10
 class Setting(NamedTuple):
     """What is the same all along a branch."""
 
-    lines: Floats | None  # lines of a drive that carries the base, in rod lengths, NaN after the last; see `line_of`
+    lines: Floats  # lines of a drive that carries the base, in rod lengths, NaN after the last; see `line_of`
     knots: Floats  # parameters at which the contour may not be smooth
     ends: tuple[float, float]  # least and greatest parameter of the contour
     may_release: bool  # whether the force may vanish: for a straight rod that turns about a pivot it does not

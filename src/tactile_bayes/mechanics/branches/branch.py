@@ -76,7 +76,7 @@ def branch_workspace(accuracy: Accuracy, order: int, samples: int, knots: int, l
 
 @compiled
 def follow_branch(
-    scene: Scene, lines: Floats | None, samples: PathSamples, workspace: BranchWorkspace, found: PathResults
+    scene: Scene, lines: Floats, samples: PathSamples, workspace: BranchWorkspace, found: PathResults
 ) -> bool:
     """Follow a branch from first contact to snap-off, and write its events and what is known of its samples. The scene
     has the first line of a drive that carries the base. False if a contact that sticks seems to end in a fold: it
@@ -86,7 +86,7 @@ def follow_branch(
     here, length, followed = _begin(start, found), FIRST_LENGTH, 0
     if event.reach != _TOUCHES:
         return True
-    may_release = lines is not None or not is_straight(scene.beam)
+    may_release = bool(lines.shape[0]) or not is_straight(scene.beam)
     setting = Setting(lines, workspace.knots, start.near.ends, may_release)
     for _ in range(workspace.legs.phase.size):
         in_dip = event.snap_off > _NEVER
@@ -170,7 +170,7 @@ def _grow(
 def _end(
     followed: int,
     here: Here,
-    lines: Floats | None,
+    lines: Floats,
     start: Beginning,
     samples: PathSamples,
     workspace: BranchWorkspace,

@@ -20,7 +20,7 @@ from tactile_bayes.mechanics.branches.leg import (
     settle_on,
     share_of,
 )
-from tactile_bayes.mechanics.branches.line import Line
+from tactile_bayes.mechanics.branches.line import Line, is_rotation
 from tactile_bayes.mechanics.branches.phase import STUCK, limit, slides, slip
 from tactile_bayes.mechanics.branches.scene import BY_Q, Equilibrium, Scene
 from tactile_bayes.mechanics.branches.series import crossing, value, weighted
@@ -161,9 +161,9 @@ def release(scene: Scene, leg: Leg) -> float:
 
 
 @compiled
-def end_of_line(line: Line | None, last: float, work: LegSeries) -> float:
+def end_of_line(line: Line, last: float, work: LegSeries) -> float:
     """Position on a leg, up to a last one, at which the line of the drive ends. The series has the travel's rate."""
-    if line is None:
+    if is_rotation(line):
         return 2.0
     travel = work.series[ANGLE]
     if value(travel, last) < line.end:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tactile_bayes.mechanics.branches.line import Line, components, off_line
+from tactile_bayes.mechanics.branches.line import Line, components, is_rotation, off_line
 from tactile_bayes.mechanics.branches.outline import Place, further, narrower, place
 from tactile_bayes.mechanics.branches.phase import (
     STUCK,
@@ -172,7 +172,7 @@ def _motion(scene: Scene, spot: Place, force: _Force, by: Move, pose: Pose) -> _
 
 @compiled
 def _equations(
-    line: Line | None,
+    line: Line,
     compliance: float,
     spot: Place,
     force: _Force,
@@ -183,7 +183,7 @@ def _equations(
     angle: float,
 ) -> _Equations:
     """Equations of a base at an angle before the turn of the suspension."""
-    if line is None:
+    if is_rotation(line):
         along, across = spot.x * force.cos + spot.y * force.sin, spot.y * force.cos - spot.x * force.sin
         p = _about_pivot(compliance, along, across, force, 0.0, by_p)
         q = _about_pivot(compliance, along, across, force, 0.0, by_q)

@@ -343,23 +343,23 @@ def _arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int
 
 
 @compiled
-def beginning(scene: Scene, lines: Floats | None, first_step: float) -> Beginning:
+def beginning(scene: Scene, lines: Floats, first_step: float) -> Beginning:
     """Beginning of a branch, on the first line that leads to contact if the drive carries the base."""
     near, scene, line, seen = _arrive(scene, lines, first_step)
     if near.reach != _TOUCHES:
         return Beginning(near.reach, near, scene, line, nowhere())
     reach, scene, state = _first_state(scene, lines, seen, near)
     contact = contact_at(scene, state.at)
-    least = scene.outline.half_angle - (0.0 if lines is None else _NOT_TURNED)
+    least = scene.outline.half_angle - (_NOT_TURNED if lines.shape[0] else 0.0)
     if reach == _TOUCHES and tip_touches(scene.phase) and contact.psi1 + contact.friction_angle < least:
         reach = _TOUCHES_TWICE
     return Beginning(reach, near, scene, line, state)
 
 
 @compiled
-def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> tuple[Approach, Scene, int, Outline]:
+def _arrive(scene: Scene, lines: Floats, first_step: float) -> tuple[Approach, Scene, int, Outline]:
     """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
-    if lines is None:
+    if not lines.shape[0]:
         return _approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline
     (reach, distance, begin, tip_first, _, gap), k, travel = _arrival(scene.outline, scene.beam, lines)
     near = Approach(reach, distance, begin, tip_first, _ends_along(scene.outline, lines), gap)
@@ -383,17 +383,17 @@ def _ends_along(outline: Outline, lines: Floats) -> tuple[float, float]:
 
 
 @compiled
-def _first_state(scene: Scene, lines: Floats | None, seen: Outline, near: Approach) -> tuple[int, Scene, Balance]:
+def _first_state(scene: Scene, lines: Floats, seen: Outline, near: Approach) -> tuple[int, Scene, Balance]:
     """State at first contact, with the friction that it has."""
     scene = in_phase(scene, touching(near.tip_first))
     begin = _unloaded(scene, lines, seen, near)
-    if scene.phase == TANGENTIAL and lines is not None and begin.at.q > 1.0:  # the approach is not exact
+    if scene.phase == TANGENTIAL and lines.shape[0] and begin.at.q > 1.0:  # the approach is not exact
         near = Approach(near.reach, near.distance, near.begin, True, near.ends, near.gap)
         scene = in_phase(scene, TIP)
         begin = _unloaded(scene, lines, seen, near)
     # A rod that turns about a pivot slides inward unless it is curved toward the object.
-    if scene.rig.friction_angle == 0.0 or (lines is None and scene.beam.most_curvature <= 0.0):
-        return _TOUCHES if lines is None or _is_pushed(begin) else _SLIPS_OFF, scene, begin
+    if scene.rig.friction_angle == 0.0 or (not lines.shape[0] and scene.beam.most_curvature <= 0.0):
+        return _TOUCHES if not lines.shape[0] or _is_pushed(begin) else _SLIPS_OFF, scene, begin
     other = with_friction(scene, -scene.rig.friction_angle)
     at_other = _unloaded(other, lines, seen, near)
     held, at_held = _held(scene, begin)
@@ -443,13 +443,13 @@ def _held(scene: Scene, begin: Balance) -> tuple[Scene, Balance]:
 
 
 @compiled
-def _unloaded(scene: Scene, lines: Floats | None, seen: Outline, near: Approach) -> Balance:
+def _unloaded(scene: Scene, lines: Floats, seen: Outline, near: Approach) -> Balance:
     """Equilibrium without force at first contact with an outline relative to the base."""
     at, chord = _touch(seen, scene.beam, near.begin, near.tip_first)
     q = chord.arclength
     if near.tip_first:
         q = bearing(at) + chord.at_point - math.atan2(at.sin, at.cos) - scene.rig.friction_angle
     start = Equilibrium(near.begin, q, 0.0)
-    if lines is None:
+    if not lines.shape[0]:
         return balance(scene, start)[0]
     return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)

@@ -16,6 +16,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Rates, balance, settle, unloaded
+from tactile_bayes.mechanics.branches.line import is_rotation
 from tactile_bayes.mechanics.branches.outline import place
 from tactile_bayes.mechanics.branches.phase import slides, slips_clearly
 from tactile_bayes.mechanics.branches.scene import (
@@ -124,7 +125,7 @@ def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -
     if slides(scene.phase):
         spot = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p))
         by_p = spot.speed * spot.speed + spot.bend * spot.bend
-        by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
+        by_force = _BY_FORCE if is_rotation(scene.line) else _BY_FORCE_ON_LINE
         across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
     else:
         across = _fastest(scene, begin)

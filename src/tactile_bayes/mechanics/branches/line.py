@@ -2,7 +2,7 @@
 
 Poses of the base are points (x, y, drive angle) in space, with lengths in rod lengths and angles in rad, and a part of
 a drive is a line in it. A state is on the line if two components across it vanish. The third is the travel. A rotation
-about a pivot that rests is the line along the drive angle; it needs no such line, for its travel is the angle itself.
+about a pivot that rests is the line along the drive angle, which has no end: its travel is the angle itself.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ class Line(NamedTuple):
 
 _STRAIGHT = 1e-9  # distance from a line that is rounding [L and rad]
 _ORIGIN = Offset(0.0, 0.0, 0.0)
-NO_LINE = Line(_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, 0.0, 0.0)
+NO_LINES = np.empty((0, 0, LINE_COLUMNS))  # of sweeps about pivots that rest
+_TURN = Offset(0.0, 0.0, 1.0)
+ROTATION = Line(_ORIGIN, _TURN, _TURN, Offset(1.0, 0.0, 0.0), Offset(0.0, 1.0, 0.0), 0.0, math.inf)
 
 
 class LinePath(NamedTuple):
@@ -165,16 +167,18 @@ def pose_at(line: Line, travel: float) -> Offset:
 
 
 @compiled
-def is_before_record(line: Line | None, travel: float) -> bool:
+def is_rotation(line: Line) -> bool:
+    """True for a rotation about a pivot that rests."""
+    return line.end == math.inf
+
+
+@compiled
+def is_before_record(line: Line, travel: float) -> bool:
     """True for a travel on the line that turns a rod in."""
-    if line is None:
-        return False
     return line.end <= 0.0 and travel < line.end
 
 
 @compiled
-def drive_angle_at(line: Line | None, travel: float) -> float:
+def drive_angle_at(line: Line, travel: float) -> float:
     """Drive angle at a travel, which is the angle itself in a rotation."""
-    if line is None:
-        return travel
     return line.begin.angle + (travel - line.travel) * line.along.angle

@@ -36,7 +36,7 @@ from tactile_bayes.mechanics.branches.leg import (
     share_of,
     shortened,
 )
-from tactile_bayes.mechanics.branches.line import Line, is_before_record
+from tactile_bayes.mechanics.branches.line import Line, is_before_record, is_rotation
 from tactile_bayes.mechanics.branches.phase import (
     ROLLING,
     contact_at,
@@ -129,9 +129,9 @@ def meet(here: Here, step: LegStep, in_dip: bool, is_first: bool, work: LegSerie
 
 
 @compiled
-def _ending(line: Line | None, found: Balance) -> Balance:
+def _ending(line: Line, found: Balance) -> Balance:
     """Equilibrium at the end of a line, to which it was found with rounding errors."""
-    if line is None:
+    if is_rotation(line):
         return found
     at, _, moment, force_x, force_y, tangent, rates = found
     return Balance(at, line.end, moment, force_x, force_y, tangent, rates)
@@ -285,7 +285,7 @@ def _regained_at(here: Here, step: LegStep, met: Meeting, most: float, work: Leg
 
 
 @inlined
-def _on_next_line(here: Here, lines: Floats | None, step: LegStep, met: Meeting) -> Here:
+def _on_next_line(here: Here, lines: Floats, step: LegStep, met: Meeting) -> Here:
     """Beginning of a leg on the next line of the drive; NaN after the last."""
     if not _goes_on(lines, here.line):
         return _stopped(here)
@@ -298,17 +298,15 @@ def _on_next_line(here: Here, lines: Floats | None, step: LegStep, met: Meeting)
 
 
 @compiled
-def _goes_on(lines: Floats | None, k: int) -> bool:
+def _goes_on(lines: Floats, k: int) -> bool:
     """True if the drive continues after a line."""
-    if lines is None:
-        return False
     return k + 1 < lines.shape[0] and not math.isnan(lines[k + 1, 0])
 
 
 @compiled
-def _length_on_line(line: Line | None, scene: Scene, begin: Balance, onward: Equilibrium) -> float:
+def _length_on_line(line: Line, scene: Scene, begin: Balance, onward: Equilibrium) -> float:
     """Length of a leg up to somewhat beyond the end of the line of the drive, as far as its travel's rate tells."""
-    if line is None:
+    if is_rotation(line):
         return LONGEST
     leg = leg_from(scene, begin, onward, LONGEST)
     room = _ROOM_PAST_LINE * (line.end - begin.travel)

@@ -130,7 +130,7 @@ def store(
 
 
 @compiled
-def recall(k: int, scene: Scene, lines: Floats | None, work: LegSeries, legs: Legs) -> Followed:
+def recall(k: int, scene: Scene, lines: Floats, work: LegSeries, legs: Legs) -> Followed:
     """Leg number k, with its series in the workspace."""
     copy_rows(legs.series[k], work.series)
     rows, course, friction = legs.leg[k], legs.course[k], legs.friction[k]

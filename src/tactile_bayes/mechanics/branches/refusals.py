@@ -30,7 +30,7 @@ _CLEARANCE = CLEARANCE
 def ruled_out(here: Here, setting: Setting, met: Meeting, work: LegSeries) -> tuple[int, float]:
     """Reason why there is no path with the growing part of a leg, a `Reachability`, and the contact where it holds."""
     scene, at, stop = here.scene, contact_at(here.scene, met.at.at), met.stop
-    if stop > 0.0 and not tip_touches(scene.phase) and setting.lines is not None and at.arclength < _CLEARANCE:
+    if stop > 0.0 and not tip_touches(scene.phase) and setting.lines.shape[0] and at.arclength < _CLEARANCE:
         return _TOO_CLOSE, at.p
     if _is_past_end(scene, setting.ends[1], stop, work):
         return _ENDS, setting.ends[1]

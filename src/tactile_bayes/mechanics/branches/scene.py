@@ -54,8 +54,7 @@ class Scene(NamedTuple):
     outline: Outline
     beam: Beam
     rig: RigParameters
-    # Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot.
-    line: Line | None
+    line: Line  # drive that carries the base, which is at the origin at its beginning; or a rotation
     phase: int
     anchor: StuckContact  # where it sticks, if it does
 
@@ -73,9 +72,9 @@ def anchored(scene: Scene, anchor: StuckContact) -> Scene:
 
 
 @compiled
-def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
-    """Scene with another line of the drive."""
-    if lines is None:
+def on_line(scene: Scene, lines: Floats, k: int) -> Scene:
+    """Scene with another line of the drive, if lines carry the base."""
+    if not lines.shape[0]:
         return scene
     return Scene(scene.outline, scene.beam, scene.rig, line_of(lines, k), scene.phase, scene.anchor)
 

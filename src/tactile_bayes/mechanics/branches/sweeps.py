@@ -21,7 +21,7 @@ from tactile_bayes.mechanics.branches.branch import (
 from tactile_bayes.mechanics.branches.clearance import travel_into
 from tactile_bayes.mechanics.branches.first_contact import clear_angle
 from tactile_bayes.mechanics.branches.leg import Accuracy
-from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
+from tactile_bayes.mechanics.branches.line import NO_LINES, ROTATION, line_of
 from tactile_bayes.mechanics.branches.outline import Outline, OutlineHalf, mirrored
 from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, PathResults, PathSamples
 from tactile_bayes.mechanics.branches.scene import NOWHERE, RigParameters, Scene
@@ -113,7 +113,7 @@ class Segments(NamedTuple):
     angles: Floats  # drive angles as read, in the sweep frame, increasing in each segment [rad]
     # Lines of the drives that carry the base, in the sweep frame from their beginnings, as in `lines_through`, shape
     # (segments, lines, columns), NaN after the last; without any, the pivots rest. Angles are then travels.
-    lines: Floats | None = None
+    lines: Floats = NO_LINES
     relative: bool = False  # true if they are shares of the drive angle from first contact to snap-off
 
 
@@ -191,29 +191,28 @@ def _scene(
     varied: Varied | None,
     known: Tables,
     sweep: Any,
-    line: Line | None,
+    room: Floats,
     table: Floats,
 ) -> Scene:
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
-    offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
+    offset = 0.0 if room.shape[0] else sign * sweep.offset  # it is in the lines
     moment = sweep.rigidity / sweep.relative_length
     force = moment / sweep.relative_length
     rig = RigParameters(sweep.friction_angle, sweep.compliance, sweep.yielding, offset, sign, moment, force)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle)
-    return Scene(outline, beam, rig, line, TIP, NOWHERE)
+    return Scene(outline, beam, rig, ROTATION, TIP, NOWHERE)
 
 
 @compiled
-def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
+def _place_lines(lines: Floats, sweep: Any, room: Floats) -> None:
     """Write the lines of a sweep with its encoder offset, and in lengths of its rod, to the room."""
-    if room is not None and lines is not None:
-        offset = -sweep.offset if sweep.backward else sweep.offset
-        for k in range(room.shape[0]):
-            for c in range(room.shape[1]):
-                room[k, c] = lines[sweep.segment, k, c] / (sweep.relative_length if c in (0, 1, 3, 4) else 1.0)
-            room[k, 2] -= offset
+    offset = -sweep.offset if sweep.backward else sweep.offset
+    for k in range(room.shape[0]):
+        for c in range(room.shape[1]):
+            room[k, c] = lines[sweep.segment, k, c] / (sweep.relative_length if c in (0, 1, 3, 4) else 1.0)
+        room[k, 2] -= offset
 
 
 @compiled
@@ -233,16 +232,11 @@ def _beam(varied: Varied | None, known: Tables, sweep: Any, sign: float, half_an
     return beam_of(0.0, rod, sweep.stem)
 
 
-def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
-    """Lines, room for those of one sweep, and a line of their type, or None: all is compiled for both."""
-    return (None, None, None) if lines is None else (lines, np.empty(lines.shape[1:]), NO_LINE)
-
-
 @compiled
-def _clear_angle(scene: Scene, lines: Floats | None, event: Any, accuracy: Accuracy) -> float:
+def _clear_angle(scene: Scene, lines: Floats, event: Any, accuracy: Accuracy) -> float:
     """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not. A rod that is
     released touches there without load, which small errors alone would decide: −∞ if it does so nowhere else."""
-    if lines is None:
+    if not lines.shape[0]:
         clear = clear_angle(scene.outline, scene.beam, accuracy.first_step)
         return -math.inf if event.snap_off == _RELEASE and clear < event.snap_angle + _SAME_ANGLE else clear
     if event.snap_off == _NEVER:
@@ -251,9 +245,9 @@ def _clear_angle(scene: Scene, lines: Floats | None, event: Any, accuracy: Accur
 
 
 @compiled
-def _is_inside_before(scene: Scene, lines: Floats | None, first: float) -> bool:
+def _is_inside_before(scene: Scene, lines: Floats, first: float) -> bool:
     """True if a drive carries the unloaded rod into the object before it touches there from this side, if it does."""
-    if lines is None:
+    if not lines.shape[0]:
         return False
     inside = travel_into(scene.outline, scene.beam, lines, line_of(lines, 0).travel, True)
     return -math.inf < inside < first - _SAME_ANGLE
@@ -266,9 +260,7 @@ def _solve(
     known: Tables,
     sweeps: Any,
     segments: Segments,
-    lines: Floats | None,
-    room: Floats | None,
-    line: Line | None,
+    room: Floats,
     asks_clearance: bool,
     workspace: BranchWorkspace,
     finer: BranchWorkspace,
@@ -284,8 +276,8 @@ def _solve(
     count, knots, accuracy = shapes.knots.shape[1], workspace.knots, workspace.leg.accuracy
     for i in range(sweeps.size):
         sweep, event, c = sweeps[i], events[i], sweeps[i].contour
-        _place_lines(lines, sweep, room)
-        scene = _scene(shapes, varied, known, sweep, line, table)
+        _place_lines(segments.lines, sweep, room)
+        scene = _scene(shapes, varied, known, sweep, room, table)
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
@@ -330,7 +322,7 @@ def solve_sweeps(
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     else:
         accuracy, order = _FAST._replace(tolerance=tolerance), _FAST_ORDER
-        may_stick = segments.lines is not None or profile is not None or bool(np.any(sweeps.rest_curvature))
+        may_stick = segments.lines.size or profile is not None or bool(np.any(sweeps.rest_curvature))
         if may_stick and np.any(sweeps.friction_angle):
             accuracy = accuracy._replace(last_step=_LAST_STEP_STUCK)
     count, rows = shape
@@ -341,11 +333,10 @@ def solve_sweeps(
     event_states = np.zeros((sweep.size, MOST_CHANGES + 1 if states else 0), dtype=STATE)
     events = np.empty(sweep.size, dtype=_EVENTS)
     longest = int(np.diff(segments.first).max(initial=0))
-    lines = 0 if segments.lines is None else segments.lines.shape[1]
 
     def solve(part: slice) -> None:
         rod = None if profile is None else profile.shaped(np.zeros(MOST_MODES))  # with arrays of its own
-        workspace = branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines)
+        workspace = branch_workspace(accuracy, order, longest, shapes.knots.shape[1], segments.lines.shape[1])
         finer = workspace.leg._replace(accuracy=accuracy._replace(resolved=_FINER))
         _solve(
             shapes,
@@ -353,7 +344,7 @@ def solve_sweeps(
             known,
             sweep[part],
             segments,
-            *_carried(segments.lines),
+            np.empty(segments.lines.shape[1:]),
             asks_clearance,
             workspace,
             workspace._replace(leg=finer),
