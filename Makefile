@@ -23,6 +23,7 @@ demo: $(READY)
 # Each process takes one core, and tests that follow one another stay in one process as far as possible: they share
 # what a file of tests prepares.
 test notebooks: export OPENBLAS_NUM_THREADS = 1
+test notebooks: export NUMBA_NUM_THREADS = 1
 test: $(READY)
 	$(BIN)/python -m pytest -n auto --dist worksteal --doctest-modules src tests $(TEST_OPTIONS)
 
