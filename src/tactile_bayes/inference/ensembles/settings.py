@@ -34,9 +34,8 @@ class SamplerSettings:
         Every parameter's effective sample size, in the bulk and in the tails, must reach this, and five for every
         walker: fewer would mean that walkers have not forgotten their starting points.
     max_steps : int, optional
-        Number of steps after which each ensemble stops, converged or not. By default 20,000, and as many as a verdict
-        needs where the best parameters of a contour leave what no noise explains: 50, or 300 of a shape-free one if
-        only noise that is alike in neighbours would.
+        Number of steps after which each ensemble stops, converged or not. By default 20,000, and 50, as many as a
+        verdict needs, where the best parameters of a contour leave what no noise explains.
     max_seconds : float, optional
         Time limit of a posterior [s], counted from the call: the search for a start ends with its present step, and so
         do the ensembles, which make at least one step. A few seconds may come on top, more at the first posterior after

@@ -36,10 +36,9 @@ _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
 _SEARCHES = 3  # for an optimum, if these draws do not lead to a mode, either
 _FARTHEST = 5.0  # standard deviations at which residuals are clipped: a sample beside an event may be loaded or not
-# Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, or only one that
-# is alike in neighbours; and the steps that a verdict needs.
-_SMOOTH, _STEPS_OF_A_VERDICT = 2.5, 50
-_ALIKE, _STEPS_IN_DOUBT = 1.4, 300
+# Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a family and
+# of a shape-free contour, which follows what families do not; and the steps that a verdict needs.
+_SMOOTH, _SMOOTH_FREE, _STEPS_OF_A_VERDICT = 2.5, 1.4, 50
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
 
 
@@ -140,12 +139,11 @@ class _Start(NamedTuple):
         )
         # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
         log_evidence = float(log_probability(whitening.middle[None])[0])
-        left = _left_over_noise(self.model, whitening.centre)
-        most_steps = _STEPS_OF_A_VERDICT if left > _SMOOTH else _STEPS_IN_DOUBT if left > _ALIKE else None
-        if not (noise.of_discrepancy or left > _SMOOTH):  # else a verdict does not need it
+        is_hopeless = _left_over_noise(self.model, whitening.centre) > _SMOOTH_FREE
+        if not (noise.of_discrepancy or is_hopeless):  # else a verdict does not need it
             rest = slice(whitening.bent, None)
             whitening, start = standardise(self.model.log_probability, whitening, start, rest, self.rng, deadline)
-        return Walk(start, whitening, log_evidence, most_steps=most_steps)
+        return Walk(start, whitening, log_evidence, most_steps=_STEPS_OF_A_VERDICT if is_hopeless else None)
 
     def scattered(self) -> Walk:
         """Return walkers scattered twice as widely as normal approximations of the modes, which serve as proposals."""
