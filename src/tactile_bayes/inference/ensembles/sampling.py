@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,7 +67,8 @@ class Draws:
         return evenly_spread(self.samples.shape[1], most)
 
 
-_DRAWS_PER_WALKER = 5  # effective ones, at least: the discarded half then exceeds five autocorrelation times
+# Effective draws per walker, at least, in bulk and tails: the discarded half exceeds as many autocorrelation times.
+_IN_BULK, _IN_TAILS = 5, 3
 _CONVERGED = "converged"
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
 _OUT_OF_TIME = "not converged, the time allowed ran out"
@@ -102,14 +103,13 @@ def sample(
     `start`, (ensembles, walkers, parameters), in the coordinates, should be wider than the posterior, or R̂ cannot
     distinguish a part of it from the whole. The second half of the steps is diagnosed after `block_steps`, and whenever
     their number has grown by a quarter (Vehtari et al. 2021, doi 10.1214/20-BA1221): the run stops when settings are
-    satisfied, with five effective draws per walker on average, and no walker lost. A KeyboardInterrupt after the first
-    step ends it. With a checkpoint a run resumes, bit by bit; `identity` states what determines the log-probability.
+    satisfied, with five effective draws per walker on average, three in the tails, and no walker lost. A
+    KeyboardInterrupt after the first step ends it. With a checkpoint a run resumes, bit by bit; `identity` states what
+    determines the log-probability.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
     names, points = tuple(names), np.array(start, dtype=float)
-    chains, walkers, _ = points.shape
-    settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
     with ExitStack() as stack:
         stored = None
         if checkpoint is not None:
@@ -154,6 +154,12 @@ class _Run:
         return self.state.steps
 
     @property
+    def least(self) -> tuple[float, float]:
+        """Effective sample sizes that are enough, in bulk and tails."""
+        walkers = self.state.last.log_probability[:, 0].size
+        return max(self.settings.min_ess, _IN_BULK * walkers), max(self.settings.min_ess, _IN_TAILS * walkers)
+
+    @property
     def seconds(self) -> float:
         return time.monotonic() - self.began
 
@@ -192,7 +198,7 @@ class _Run:
         self.state = self.state.halved()
         self.diagnosis = found = Diagnosis(self.state.half.samples)
         if not self.ending:
-            enough = found.satisfies(settings.max_r_hat, settings.min_ess)
+            enough = found.satisfies(settings.max_r_hat, *self.least)
             spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.most_steps else ""
             self.ending = _CONVERGED if enough and not np.any(self.state.were_lost()) else spent
         if self.stored is not None and self.ending not in ("", _INTERRUPTED):
@@ -216,8 +222,9 @@ class _Run:
         modes = () if converged else modes_of(half.samples, half.values, names)
         message = f"{self.ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {found.message(names)}"
         if not converged:
-            criteria = f"R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
-            message += f"; criteria: {criteria}"
+            bulk, tails = self.least
+            criteria = f"R̂ below {settings.max_r_hat:g} and an effective sample size of {bulk:.0f} in the bulk"
+            message += f"; criteria: {criteria} and {tails:.0f} in the tails"
         if modes:
             message += f"; {modes_message(modes)}"
         of_walkers = f"of {chains * walkers} walkers"

@@ -32,7 +32,7 @@ class SamplerSettings:
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
         Every parameter's effective sample size, in the bulk and in the tails, must reach this, and five for every
-        walker: fewer would mean that walkers have not forgotten their starting points.
+        walker, three in the tails: fewer would mean that walkers have not forgotten their starting points.
     max_steps : int, optional
         Number of steps after which each ensemble stops, converged or not. By default 20,000, and 50, as many as a
         verdict needs, where the best parameters of a contour leave what no noise explains.
