@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import platform
@@ -80,7 +81,10 @@ class Manifest:
 
 
 def versions_here() -> dict[str, str]:
-    return {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}}
+    return {"python": platform.python_version(), **{name: _version_of(name) for name in _LIBRARIES}}
+
+
+_version_of = functools.cache(version)  # which reads a folder of files each time
 
 
 def write_manifest(manifest: Manifest, folder: Path) -> None:
