@@ -29,6 +29,7 @@ _CORRECTION = (
     "same files again"
 )
 _OF_SPECIFICATION = ("name", "specification_sha256", "seed", "records", "shard_records")
+_version_of = functools.cache(version)  # which reads a folder of files each time
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "xarray", "h5netcdf", "h5py")
 
 
@@ -82,9 +83,6 @@ class Manifest:
 
 def versions_here() -> dict[str, str]:
     return {"python": platform.python_version(), **{name: _version_of(name) for name in _LIBRARIES}}
-
-
-_version_of = functools.cache(version)  # which reads a folder of files each time
 
 
 def write_manifest(manifest: Manifest, folder: Path) -> None:

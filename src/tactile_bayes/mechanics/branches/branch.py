@@ -29,6 +29,7 @@ from tactile_bayes.mechanics.branches.leg import (
     LegSeries,
     leg_series,
 )
+from tactile_bayes.mechanics.branches.line import pivots
 from tactile_bayes.mechanics.branches.meeting import OPEN, Meeting, fate_of, go_on, meet, slid_back
 from tactile_bayes.mechanics.branches.phase import contact_at, slides, tip_touches
 from tactile_bayes.mechanics.branches.readings import (
@@ -86,7 +87,7 @@ def follow_branch(
     here, length, followed = _begin(start, found), FIRST_LENGTH, 0
     if event.reach != _TOUCHES:
         return True
-    may_release = bool(lines.shape[0]) or not is_straight(scene.beam)
+    may_release = not pivots(lines) or not is_straight(scene.beam)
     setting = Setting(lines, workspace.knots, start.near.ends, may_release)
     for _ in range(workspace.legs.phase.size):
         in_dip = event.snap_off > _NEVER

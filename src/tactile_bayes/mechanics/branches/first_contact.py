@@ -10,7 +10,7 @@ from typing import NamedTuple
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, balance, nowhere, settle, unloaded
 from tactile_bayes.mechanics.branches.leg import HARDLY
-from tactile_bayes.mechanics.branches.line import Line, line_of, pose_at
+from tactile_bayes.mechanics.branches.line import Line, line_of, pivots, pose_at
 from tactile_bayes.mechanics.branches.outline import (
     Outline,
     Place,
@@ -350,7 +350,7 @@ def beginning(scene: Scene, lines: Floats, first_step: float) -> Beginning:
         return Beginning(near.reach, near, scene, line, nowhere())
     reach, scene, state = _first_state(scene, lines, seen, near)
     contact = contact_at(scene, state.at)
-    least = scene.outline.half_angle - (_NOT_TURNED if lines.shape[0] else 0.0)
+    least = scene.outline.half_angle - (0.0 if pivots(lines) else _NOT_TURNED)
     if reach == _TOUCHES and tip_touches(scene.phase) and contact.psi1 + contact.friction_angle < least:
         reach = _TOUCHES_TWICE
     return Beginning(reach, near, scene, line, state)
@@ -359,7 +359,7 @@ def beginning(scene: Scene, lines: Floats, first_step: float) -> Beginning:
 @compiled
 def _arrive(scene: Scene, lines: Floats, first_step: float) -> tuple[Approach, Scene, int, Outline]:
     """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
-    if not lines.shape[0]:
+    if pivots(lines):
         return _approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline
     (reach, distance, begin, tip_first, _, gap), k, travel = _arrival(scene.outline, scene.beam, lines)
     near = Approach(reach, distance, begin, tip_first, _ends_along(scene.outline, lines), gap)
@@ -387,13 +387,13 @@ def _first_state(scene: Scene, lines: Floats, seen: Outline, near: Approach) -> 
     """State at first contact, with the friction that it has."""
     scene = in_phase(scene, touching(near.tip_first))
     begin = _unloaded(scene, lines, seen, near)
-    if scene.phase == TANGENTIAL and lines.shape[0] and begin.at.q > 1.0:  # the approach is not exact
+    if scene.phase == TANGENTIAL and not pivots(lines) and begin.at.q > 1.0:  # the approach is not exact
         near = Approach(near.reach, near.distance, near.begin, True, near.ends, near.gap)
         scene = in_phase(scene, TIP)
         begin = _unloaded(scene, lines, seen, near)
     # A rod that turns about a pivot slides inward unless it is curved toward the object.
-    if scene.rig.friction_angle == 0.0 or (not lines.shape[0] and scene.beam.most_curvature <= 0.0):
-        return _TOUCHES if not lines.shape[0] or _is_pushed(begin) else _SLIPS_OFF, scene, begin
+    if scene.rig.friction_angle == 0.0 or (pivots(lines) and scene.beam.most_curvature <= 0.0):
+        return _TOUCHES if pivots(lines) or _is_pushed(begin) else _SLIPS_OFF, scene, begin
     other = with_friction(scene, -scene.rig.friction_angle)
     at_other = _unloaded(other, lines, seen, near)
     held, at_held = _held(scene, begin)
@@ -450,6 +450,6 @@ def _unloaded(scene: Scene, lines: Floats, seen: Outline, near: Approach) -> Bal
     if near.tip_first:
         q = bearing(at) + chord.at_point - math.atan2(at.sin, at.cos) - scene.rig.friction_angle
     start = Equilibrium(near.begin, q, 0.0)
-    if not lines.shape[0]:
+    if pivots(lines):
         return balance(scene, start)[0]
     return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)

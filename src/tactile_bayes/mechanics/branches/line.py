@@ -167,6 +167,12 @@ def pose_at(line: Line, travel: float) -> Offset:
 
 
 @compiled
+def pivots(lines: Floats) -> bool:
+    """True if no lines carry the base: it turns about a pivot that rests."""
+    return lines.shape[0] == 0
+
+
+@compiled
 def is_rotation(line: Line) -> bool:
     """True for a rotation about a pivot that rests."""
     return line.end == math.inf

@@ -10,6 +10,7 @@ import math
 
 from tactile_bayes.mechanics.branches.advance import Here, Setting
 from tactile_bayes.mechanics.branches.leg import PLACE, REST, LegSeries, guess
+from tactile_bayes.mechanics.branches.line import pivots
 from tactile_bayes.mechanics.branches.meeting import Meeting
 from tactile_bayes.mechanics.branches.outline import Place, beside, is_inside
 from tactile_bayes.mechanics.branches.phase import STUCK, Touch, contact_at, tip_touches
@@ -30,7 +31,7 @@ _CLEARANCE = CLEARANCE
 def ruled_out(here: Here, setting: Setting, met: Meeting, work: LegSeries) -> tuple[int, float]:
     """Reason why there is no path with the growing part of a leg, a `Reachability`, and the contact where it holds."""
     scene, at, stop = here.scene, contact_at(here.scene, met.at.at), met.stop
-    if stop > 0.0 and not tip_touches(scene.phase) and setting.lines.shape[0] and at.arclength < _CLEARANCE:
+    if stop > 0.0 and not tip_touches(scene.phase) and not pivots(setting.lines) and at.arclength < _CLEARANCE:
         return _TOO_CLOSE, at.p
     if _is_past_end(scene, setting.ends[1], stop, work):
         return _ENDS, setting.ends[1]

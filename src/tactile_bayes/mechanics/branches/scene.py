@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.line import Line, line_of
+from tactile_bayes.mechanics.branches.line import Line, line_of, pivots
 from tactile_bayes.mechanics.branches.outline import Outline
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.beam import Beam, rubbed_otherwise
@@ -74,7 +74,7 @@ def anchored(scene: Scene, anchor: StuckContact) -> Scene:
 @compiled
 def on_line(scene: Scene, lines: Floats, k: int) -> Scene:
     """Scene with another line of the drive, if lines carry the base."""
-    if not lines.shape[0]:
+    if pivots(lines):
         return scene
     return Scene(scene.outline, scene.beam, scene.rig, line_of(lines, k), scene.phase, scene.anchor)
 

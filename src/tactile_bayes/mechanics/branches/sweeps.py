@@ -21,7 +21,7 @@ from tactile_bayes.mechanics.branches.branch import (
 from tactile_bayes.mechanics.branches.clearance import travel_into
 from tactile_bayes.mechanics.branches.first_contact import clear_angle
 from tactile_bayes.mechanics.branches.leg import Accuracy
-from tactile_bayes.mechanics.branches.line import NO_LINES, ROTATION, line_of
+from tactile_bayes.mechanics.branches.line import NO_LINES, ROTATION, line_of, pivots
 from tactile_bayes.mechanics.branches.outline import Outline, OutlineHalf, mirrored
 from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, PathResults, PathSamples
 from tactile_bayes.mechanics.branches.scene import NOWHERE, RigParameters, Scene
@@ -196,7 +196,7 @@ def _scene(
 ) -> Scene:
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
-    offset = 0.0 if room.shape[0] else sign * sweep.offset  # it is in the lines
+    offset = sign * sweep.offset if pivots(room) else 0.0  # it is in the lines
     moment = sweep.rigidity / sweep.relative_length
     force = moment / sweep.relative_length
     rig = RigParameters(sweep.friction_angle, sweep.compliance, sweep.yielding, offset, sign, moment, force)
@@ -236,7 +236,7 @@ def _beam(varied: Varied | None, known: Tables, sweep: Any, sign: float, half_an
 def _clear_angle(scene: Scene, lines: Floats, event: Any, accuracy: Accuracy) -> float:
     """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not. A rod that is
     released touches there without load, which small errors alone would decide: −∞ if it does so nowhere else."""
-    if not lines.shape[0]:
+    if pivots(lines):
         clear = clear_angle(scene.outline, scene.beam, accuracy.first_step)
         return -math.inf if event.snap_off == _RELEASE and clear < event.snap_angle + _SAME_ANGLE else clear
     if event.snap_off == _NEVER:
@@ -247,7 +247,7 @@ def _clear_angle(scene: Scene, lines: Floats, event: Any, accuracy: Accuracy) ->
 @compiled
 def _is_inside_before(scene: Scene, lines: Floats, first: float) -> bool:
     """True if a drive carries the unloaded rod into the object before it touches there from this side, if it does."""
-    if not lines.shape[0]:
+    if pivots(lines):
         return False
     inside = travel_into(scene.outline, scene.beam, lines, line_of(lines, 0).travel, True)
     return -math.inf < inside < first - _SAME_ANGLE
