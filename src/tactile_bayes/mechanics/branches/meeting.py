@@ -36,7 +36,7 @@ from tactile_bayes.mechanics.branches.leg import (
     share_of,
     shortened,
 )
-from tactile_bayes.mechanics.branches.line import Line, is_before_record, is_rotation
+from tactile_bayes.mechanics.branches.line import Line, is_before_record
 from tactile_bayes.mechanics.branches.phase import (
     ROLLING,
     contact_at,
@@ -131,8 +131,6 @@ def meet(here: Here, step: LegStep, in_dip: bool, is_first: bool, work: LegSerie
 @compiled
 def _ending(line: Line, found: Balance) -> Balance:
     """Equilibrium at the end of a line, to which it was found with rounding errors."""
-    if is_rotation(line):
-        return found
     at, _, moment, force_x, force_y, tangent, rates = found
     return Balance(at, line.end, moment, force_x, force_y, tangent, rates)
 
@@ -293,7 +291,7 @@ def _on_next_line(here: Here, lines: Floats, step: LegStep, met: Meeting) -> Her
     scene = on_line(here.scene, lines, line)
     begin = settle(scene, met.left.at, met.left.at, step.leg.normal, 0.0, SETTLED)
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
-    longest = _length_on_line(scene.line, scene, begin, onward) if _goes_on(lines, line) else LONGEST
+    longest = _length_on_line(scene, begin, onward) if _goes_on(lines, line) else LONGEST
     return Here(scene, line, begin, nowhere(), onward, longest)
 
 
@@ -304,12 +302,10 @@ def _goes_on(lines: Floats, k: int) -> bool:
 
 
 @compiled
-def _length_on_line(line: Line, scene: Scene, begin: Balance, onward: Equilibrium) -> float:
+def _length_on_line(scene: Scene, begin: Balance, onward: Equilibrium) -> float:
     """Length of a leg up to somewhat beyond the end of the line of the drive, as far as its travel's rate tells."""
-    if is_rotation(line):
-        return LONGEST
     leg = leg_from(scene, begin, onward, LONGEST)
-    room = _ROOM_PAST_LINE * (line.end - begin.travel)
+    room = _ROOM_PAST_LINE * (scene.line.end - begin.travel)
     pace = begin.rates.travel / dot(leg.normal, begin.tangent)
     return LONGEST * room / pace if pace > room > 0.0 else LONGEST
 
