@@ -104,7 +104,7 @@ def checkpoint(folder):
             pass
 
     read()
-    right = {"kind": "ensembles of tactile-bayes", "format": 3, "steps": 0, "seconds": 0.0, "is_end": False}
+    right = {"kind": "ensembles of tactile-bayes", "format": 4, "steps": 0, "seconds": 0.0, "is_end": False}
     return json.dumps(right | {"random_states": [], "identity": {"seed": "1"}}), read
 
 

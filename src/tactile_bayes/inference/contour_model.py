@@ -201,14 +201,16 @@ class ContourModel:
         if not self.noise.of_discrepancy:
             return None
         scale, length = points[:, [self.names.index(name) for name in self.noise.of_discrepancy]].T
-        course = self.likelihood.segments.course
-        read = course.load_in_contact(loads) * self.likelihood.load_cell.own_gains
-        return Discrepancy(course, scale[:, None, None] * read, length)
+        return Discrepancy(self.likelihood.segments.course, scale[:, None, None] * self._largest(loads), length)
 
-    def load_in_contact(self, point: Floats) -> Floats:
-        """Return the largest load of each sample's segment if it is in contact, (samples, 3), at a point, (d,)."""
+    def _largest(self, loads: Floats) -> Floats:
+        """Return the largest readings of samples' segments if they are in contact, for loads (n, samples, 3)."""
+        return self.likelihood.segments.course.load_in_contact(loads) * self.likelihood.load_cell.own_gains
+
+    def largest_in_contact(self, point: Floats) -> Floats:
+        """Return the largest reading of each sample's segment if it is in contact, (samples, 3), at a point, (d,)."""
         loads, _ = self.likelihood.predict(self.contours(point[None]), self.rig(point[None]))
-        return self.likelihood.segments.course.load_in_contact(loads[0])
+        return self._largest(loads)[0]
 
     def discrepancy_at(self, point: Floats) -> Discrepancy | None:
         """Return the discrepancy of one point, shape (d,), for a single record; None without."""

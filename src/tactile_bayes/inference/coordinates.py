@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -25,6 +26,11 @@ class Coordinates:
         """Number of the first coordinates, if all others are nearly standard normal."""
         return None
 
+    @property
+    def fitted(self) -> Mapping[str, Floats]:
+        """What draws have changed of the map, by the names of its fields."""
+        return {}
+
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Return parameters, (n, parameters), and the log of the Jacobian determinant of the map to them, (n,)."""
         return coordinates, np.zeros(len(coordinates))
@@ -32,6 +38,15 @@ class Coordinates:
     def of(self, points: Floats) -> Floats:
         """Return the coordinates of points, shape (..., parameters)."""
         return points
+
+    def adapted(self, draws: Floats) -> Self:
+        """Return coordinates that suit a target better of which these are draws, (walkers, steps, coordinates)."""
+        return self
+
+    def refitted(self, fitted: Mapping[str, Floats]) -> Self:
+        """Return coordinates with other `fitted`."""
+        changes: dict[str, Any] = dict(fitted)
+        return replace(self, **changes)
 
 
 @dataclass(frozen=True, eq=False)

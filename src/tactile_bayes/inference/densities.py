@@ -95,7 +95,7 @@ class Proposal:
         correlation = (weights[:, None] * standard).T @ standard / (1.0 - np.sum(weights**2))
         above = (mean - ends.low) / deviation
         for j in np.flatnonzero(above < -_CUTS[0]):
-            shift, extra = _untruncated(above[j], correlation[j, j])
+            shift, extra = untruncated(above[j], correlation[j, j])
             along = correlation[:, j] / correlation[j, j]
             mean = mean + deviation * along * shift
             correlation = correlation + extra * np.outer(along, along)
@@ -214,8 +214,11 @@ def _refuse_constant(deviation: Floats, size: Floats) -> None:
         raise np.linalg.LinAlgError("a parameter is the same in all points")
 
 
-def _untruncated(above: float, variance: float) -> tuple[float, float]:
-    """Return changes of mean and variance that undo truncation at a bound `above` below the mean, in deviations."""
+def untruncated(above: float, variance: float) -> tuple[float, float]:
+    """Return changes of mean and variance that undo truncation at a bound `above` below the mean, in deviations. A
+    half-normal distribution becomes the normal one of which it is a half."""
+    if above >= -_CUTS[0]:
+        return 0.0, 0.0
     mills = np.exp(-0.5 * _CUTS**2) / (np.sqrt(2.0 * np.pi) * ndtr(-_CUTS))
     narrow = np.sqrt(1.0 - mills * (mills - _CUTS))
     cut = np.interp(-above, -(mills - _CUTS) / narrow, _CUTS)

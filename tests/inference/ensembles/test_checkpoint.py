@@ -1,7 +1,7 @@
 """Runs that are killed, stopped or ended, and go on from what is on disk."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 
@@ -11,6 +11,7 @@ import pytest
 from helpers.refusals import refused
 from tactile_bayes import SamplerSettings
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.ensembles import Draws, checkpoint, sample
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
@@ -85,6 +86,37 @@ def assert_same(one: Draws, other: Draws) -> None:
 
 def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@dataclass(frozen=True, eq=False)
+class Scaled(Coordinates):
+    """Parameters over their standard deviations, as the first steps show them."""
+
+    scale: np.ndarray
+
+    @property
+    def fitted(self):
+        return {"scale": self.scale}
+
+    def parameters(self, coordinates):
+        return self.scale * coordinates, np.full(len(coordinates), np.log(self.scale).sum())
+
+    def of(self, points):
+        return points / self.scale
+
+    def adapted(self, draws):
+        return Scaled(self.scale * draws.std(axis=(0, 1)))
+
+
+@pytest.mark.parametrize("calls", [43, 77])
+def test_coordinates_that_a_run_has_fitted_are_those_with_which_it_goes_on(tmp_path, calls):
+    """Killed before the third and the fourth time that they are."""
+    begun = Scaled(np.array([0.1, 3.0]))
+    with pytest.raises(Killed):
+        draw(tmp_path, target=Counted(killed_at=calls), coordinates=begun)
+    with np.load(tmp_path / "checkpoint.npz") as arrays:
+        assert np.all(np.abs(np.log(arrays["fitted_scale"] / begun.scale)) > 0.5)
+    assert_same(draw(tmp_path, coordinates=begun), draw(coordinates=begun))
 
 
 @pytest.mark.parametrize("calls", [1, 25, pytest.param(97, marks=pytest.mark.slow)])
@@ -212,7 +244,7 @@ def test_an_integer_and_its_sequence_are_one_seed(begun):
     assert draw(begun, identity=SAME, seed=np.random.SeedSequence(3)).steps_run == 60
 
 
-ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 3, "steps": 0}
+ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 4, "steps": 0}
 
 
 @pytest.mark.parametrize(
@@ -222,7 +254,7 @@ ENSEMBLES = {"kind": "ensembles of tactile-bayes", "format": 3, "steps": 0}
         ({"text": "[]"}, "damaged"),
         ({"text": '{"step": 3}'}, "damaged"),
         ({"text": '{"kind": "weights", "format": 1}'}, "'weights'"),
-        ({"text": json.dumps(ENSEMBLES | {"format": 4})}, "format 4"),
+        ({"text": json.dumps(ENSEMBLES | {"format": 5})}, "format 5"),
         ({"text": json.dumps(ENSEMBLES | {"identity": []})}, "damaged"),
         ({"text": json.dumps(ENSEMBLES | {"identity": {}})}, "left out there"),
         ({"identity": SAME | {"version of emcee": "3.1.5"}}, "version of emcee is 3.1.5 there"),

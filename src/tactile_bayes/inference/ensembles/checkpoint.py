@@ -44,7 +44,8 @@ def identity_of_run(
     }
 
 
-_FILE, _KIND, _FORMAT = "checkpoint.npz", "ensembles of tactile-bayes", 3
+_FILE, _KIND, _FORMAT = "checkpoint.npz", "ensembles of tactile-bayes", 4
+_FITTED = "fitted_"  # before the names of what draws have changed of the coordinates
 _SECONDS = 5.0  # least time between two files, of up to 32 MB: a killed run makes the steps of this time again
 
 
@@ -81,6 +82,7 @@ class Checkpoint:
             half = StoredSteps(*(arrays[name] for name in ("numbers", "samples", "log_probability", "moved")))
             if places.shape != shape or half.moved.shape[1] != self._steps - self._steps // 2:
                 raise ValueError(f"it has places of shape {places.shape} after {half.moved.shape[1]} steps")
+            coordinates = coordinates.refitted({name: arrays[_FITTED + name] for name in coordinates.fitted})
             return RunState(coordinates, last, self._steps, (half,), arrays["taken_back"])
 
     def write(self, state: RunState, seconds: float, *, is_end: bool = False) -> None:
@@ -92,6 +94,7 @@ class Checkpoint:
         states = [(name, key.tolist(), *rest) for name, key, *rest in last.random_states]
         about = {"kind": _KIND, "format": _FORMAT, "steps": state.steps, "seconds": seconds, "is_end": is_end}
         about |= {"random_states": states, "identity": self._identity}
+        fitted: dict[str, Any] = {_FITTED + name: values for name, values in state.coordinates.fitted.items()}
         with write_atomically(self._path) as temporary:
             np.savez(
                 temporary,
@@ -103,6 +106,7 @@ class Checkpoint:
                 log_probability=half.values,
                 moved=half.moved,
                 taken_back=state.taken_back,
+                **fitted,
             )
         self._steps, self.seconds, self.is_end = state.steps, seconds, is_end
         self._due = time.monotonic() + _SECONDS

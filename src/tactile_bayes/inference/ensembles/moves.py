@@ -119,8 +119,8 @@ def whitened_moves(bent: int) -> Moves:
     """Return the moves for coordinates that are nearly independent and standard normal, except the first `bent`."""
     first, rest = slice(0, bent), slice(bent, None)
     return [
-        (FittedMove(first), 0.35),
-        (NormalMove(rest), 0.5),
-        (emcee.moves.DEMove(), 0.12),
-        (emcee.moves.DEMove(gamma0=1.0), 0.03),
+        (FittedMove(first), 0.3),
+        (NormalMove(rest), 0.6),
+        (emcee.moves.DEMove(), 0.08),
+        (emcee.moves.DEMove(gamma0=1.0), 0.02),
     ]

@@ -136,6 +136,19 @@ class RunState:
         earlier = lost_walkers(self.half.values[:, : self.half.values.shape[1] // 2])
         return earlier | self.lost() | (self.taken_back > self.steps // 2)
 
+    def adapted(self) -> RunState:
+        """Return the state in coordinates that are fitted to the steps kept of walkers that are not lost."""
+        last, before, kept = self.last, self.coordinates, np.moveaxis(self.half.samples, 1, 2)[~self.lost()]
+        coordinates = before.adapted(before.of(kept.reshape(-1, kept.shape[-1])).reshape(kept.shape))
+        if coordinates is before:
+            return self
+        places = last.samples[:, -1].reshape(-1, kept.shape[-1])
+        points, growth = before.parameters(places)
+        there = coordinates.of(points)
+        changed = (coordinates.parameters(there)[1] - growth).reshape(last.samples[:, 0].shape[:2])
+        there, values = there.reshape(last.samples[:, :1].shape), last.log_probability[:, -1:] + changed[:, None]
+        return replace(self, coordinates=coordinates, last=replace(last, samples=there, log_probability=values))
+
     def recovered(self) -> RunState:
         """Return the state with few lost walkers taken back to where others were; many that are lost may be a mode."""
         lost = self.lost()

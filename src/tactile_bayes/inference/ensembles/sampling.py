@@ -69,6 +69,7 @@ class Draws:
 
 # Effective draws per walker, at least, in bulk and tails: the discarded half exceeds as many autocorrelation times.
 _IN_BULK, _IN_TAILS = 5, 3
+_ADAPTED = 50  # steps up to which coordinates are fitted to those kept at each diagnosis
 _CONVERGED = "converged"
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
 _OUT_OF_TIME = "not converged, the time allowed ran out"
@@ -146,7 +147,7 @@ class _Run:
     due: int = 0  # number of steps of the next diagnosis
 
     def __post_init__(self) -> None:
-        self.density, limit = in_coordinates(self.target, self.coordinates), self.settings.max_seconds
+        limit = self.settings.max_seconds
         self.deadline = NEVER if limit is None else Deadline(self.began + limit)
 
     @property
@@ -172,7 +173,8 @@ class _Run:
             self.target.evaluations = points[..., 0].size * (1 + self.steps)
             ended_at = self.steps if stored.is_end else 0
         else:
-            values = np.array([self.density(ensemble) for ensemble in points])
+            density = in_coordinates(self.target, self.coordinates)
+            values = np.array([density(ensemble) for ensemble in points])
             randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
             self.state = RunState.begin(self.coordinates, Block(points[:, None], values[:, None], randoms))
         # A run that was killed before a diagnosis is diagnosed where it is.
@@ -183,7 +185,9 @@ class _Run:
         self.due = min(self.due, self.settings.most_steps)
         while self.steps < self.due and not (self.is_late or self.ending):
             steps = min(self.settings.block_steps, self.due - self.steps)
-            block = make_block(self.density, moves_in(self.coordinates), self.state.last, steps, self.deadline)
+            coordinates = self.state.coordinates
+            density = in_coordinates(self.target, coordinates)
+            block = make_block(density, moves_in(coordinates), self.state.last, steps, self.deadline)
             self.diagnosis = None
             self.state = self.state.append(block)
             if not block.whole:
@@ -208,6 +212,8 @@ class _Run:
             self.progress(Progress(self.steps, settings.most_steps, *worst, self.seconds))
         if self.steps == next_diagnosis(self.steps - 1, settings.block_steps):  # not where a budget ended
             self.state = self.state.recovered()
+            if self.steps <= next_diagnosis(_ADAPTED - 1, settings.block_steps):
+                self.state = self.state.adapted()
         self.due = next_diagnosis(self.steps, settings.block_steps)
 
     def draws(self) -> Draws:

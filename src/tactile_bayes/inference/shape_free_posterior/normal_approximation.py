@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -14,6 +13,7 @@ from scipy.special import log_ndtr, ndtri_exp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
+from tactile_bayes.inference.shape_free_posterior.correlated_noise import CorrelatedNoise
 from tactile_bayes.inference.shape_free_posterior.observations import (
     LinearPrior,
     Observer,
@@ -69,40 +69,6 @@ class Anchor:
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
 
 
-class _SmoothNoise(NamedTuple):
-    """White noise that is as harmful as a discrepancy to what changes slowly along a sweep, the shape of a contour."""
-
-    size: Floats  # root mean square of the largest load in contact over the noise, for each parameter of the noise
-    step: float  # distance of samples
-    longest: float  # length of a sweep in contact
-
-    @classmethod
-    def at(cls, observer: Observer, point: Floats) -> _SmoothNoise:
-        """Return the noise for the loads of a point, shape (parameters,)."""
-        model = observer.model
-        nothing = cls(np.zeros(len(model.noise.channels)), 1.0, 1.0)
-        if not model.noise.of_discrepancy:
-            return nothing
-        course = model.likelihood.segments.course
-        largest = model.load_in_contact(point) / observer.noise
-        in_contact = largest.any(axis=1)
-        if not in_contact.any():
-            return nothing
-        sizes = [np.sqrt(np.mean(np.square(largest[in_contact][:, chosen]))) for chosen in model.noise_columns]
-        step = float(np.mean(course.step[np.isfinite(course.step)]))
-        sweeps = np.count_nonzero(np.isinf(course.step))
-        return cls(np.array(sizes), step, step * np.count_nonzero(in_contact) / sweeps)
-
-    def beside(self, white: Floats, discrepancy: Floats) -> Floats:
-        """Return the noise, shape (n, noises), beside a discrepancy of scale and length (n, 2), or none (n, 0)."""
-        if not discrepancy.size:
-            return white
-        scale, length = discrepancy[:, :1], discrepancy[:, 1:]
-        # The integral of Matérn's correlation, ν = 3/2, is 4/√3 lengths.
-        alike = np.minimum(4.0 / np.sqrt(3.0) * length, self.longest) / self.step
-        return np.asarray(np.hypot(white, scale * np.sqrt(np.maximum(alike, 1.0)) * self.size))
-
-
 class NormalApproximation:
     """Normal distribution of the linear parameters, given amplitude, length scale and noise, `scales` of the model.
 
@@ -115,7 +81,6 @@ class NormalApproximation:
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
         self.white = white_scales(observer.model)
-        self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None])[0])
         known, self._count = family.radius.directions, family.radius.count
         vertex = linear_names(observer.model).index("q")
         self._vertex = slice(vertex, vertex + 2)
@@ -123,7 +88,16 @@ class NormalApproximation:
         self._radius = family.radius
         log_radius = self._log_radius(scales[None], linear[None])[0]
         self._centre = np.append(log_radius, linear[1 + self._count :])
-        self.observations = linearised(observer, prior, scales, self._centre)
+        self._alike: CorrelatedNoise | None = None
+        if observer.model.noise.of_discrepancy:
+            here = joined(observer.model, scales[None], linear[None])[0]
+            largest = observer.model.largest_in_contact(here) / observer.noise
+            self.observations = linearised(observer, prior, scales, self._centre, scales[self.white.stop] * largest)
+            each = [largest[:, chosen] for chosen in observer.model.noise_columns]
+            course, seen = observer.model.likelihood.segments.course, self.observations
+            self._alike = CorrelatedNoise(seen.axes, seen.used, course, each, scales[self.white.start :])
+        else:
+            self.observations = linearised(observer, prior, scales, self._centre)
         slopes = self.observations.slopes
         # The map from linear parameters to observations, at every length scale of the tabulated directions.
         nodes = known.values.shape[1]
@@ -148,24 +122,32 @@ class NormalApproximation:
         bent[:, self._vertex] += beyond if back else -beyond
         return bent
 
-    def _information(self, scales: Floats) -> tuple[Floats, Floats]:
-        """Return slopes of the observations over the linear parameters, (n, observations, d), in units of their noise,
-        and one over that noise, (n, observations); that of the snap-offs is known."""
+    def _seen(self, scales: Floats, columns: Floats) -> Floats:
+        """Return columns of observations, (n or 1, observations, k), in units of their noise; that of the snap-offs is
+        known."""
+        white = scales[:, self.white]
+        noise = np.hstack([white, np.ones((len(scales), 1))])[:, self.observations.kinds]
+        if self._alike is not None:
+            columns = self._alike.whitened(columns, white, scales[:, self.white.stop :])
+        return np.asarray(columns / noise[..., None])
+
+    def _rows(self, scales: Floats) -> Floats:
+        """Return slopes of the observations over the linear parameters, and their values as last column, in units of
+        their noise, shape (n, observations, d + 1)."""
         at = np.clip(np.log(scales[:, 1]), self._through.x[0], self._through.x[-1])
-        noise = self._smooth.beside(scales[:, self.white], scales[:, self.white.stop :])
-        certainty = np.hstack([1.0 / noise, np.ones((len(scales), 1))])[:, self.observations.kinds]
-        through = self._through(at) * certainty[:, None, :]
+        through = self._through(at)
         through[:, 1 : 1 + self._count] *= scales[:, :1, None]
-        return np.swapaxes(through, 1, 2), certainty
+        values = np.broadcast_to(self.observations.values[:, None], (len(scales), self.observations.values.size, 1))
+        return self._seen(scales, np.concatenate([np.swapaxes(through, 1, 2), values], axis=2))
 
     def nearest(self, scales: Floats) -> Floats:
         """Return the linear parameters, (d,), with which a contour of other scales, (k,), is nearest the centre."""
-        (through,), (certainty,) = self._information(scales[None])
+        through = self._rows(scales[None])[0, :, :-1]
         each = np.eye(self.prior.mean.size)
         radii = self._log_radius(np.tile(scales, (len(each), 1)), each).T
         units = np.append(np.ones(len(radii)), 1.0 / self.prior.deviation[1 + self._count :])
         rows = np.vstack([through, radii, each[1 + self._count :] * units[len(radii) :, None]])
-        observed = certainty * (self.observations.slopes @ self._centre)
+        observed = self._seen(scales[None], (self.observations.slopes @ self._centre)[None, :, None])[0, :, 0]
         return np.asarray(np.linalg.lstsq(rows, np.append(observed, units * self._centre))[0])
 
     def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
@@ -176,11 +158,10 @@ class NormalApproximation:
     def _triangular(self, scales: Floats) -> Floats:
         """Return Lᵀ with L⁻¹b as last column, and below that the root of the least squares, up to sign. Orthogonal
         transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15."""
-        through, certainty = self._information(scales)
-        size, root = self.prior.mean.size, self.prior.root
-        rows = np.zeros((len(scales), size + through.shape[1], size + 1))
+        observed, size, root = self._rows(scales), self.prior.mean.size, self.prior.root
+        rows = np.empty((len(scales), size + observed.shape[1], size + 1))
         rows[:, :size] = np.column_stack([root, root @ self.prior.mean])
-        rows[:, size:, :size], rows[:, size:, size] = through, certainty * self.observations.values
+        rows[:, size:] = observed
         upper = np.asarray(np.linalg.qr(rows, mode="r"))
         return upper * np.copysign(1.0, np.diagonal(upper, axis1=1, axis2=2))[..., None]
 
@@ -193,12 +174,10 @@ class NormalApproximation:
     def damped(self, scales: Floats, start: Floats, damping: Floats) -> Floats:
         """Return linear parameters, (n, d), after Levenberg–Marquardt steps from a start, (d,), with dampings (n,).
         Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value."""
-        (through,), (certainty,) = self._information(scales[None])
-        root = self.prior.root
+        observed, root = self._rows(scales[None])[0], self.prior.root
+        through = observed[:, :-1]
         _, sizes, axes = np.linalg.svd(slopes := np.linalg.solve(root.T, through.T).T)
-        pull = axes @ (
-            slopes.T @ (certainty * self.observations.values - through @ start) + root @ (self.prior.mean - start)
-        )
+        pull = axes @ (slopes.T @ (observed[:, -1] - through @ start) + root @ (self.prior.mean - start))
         precision = 1.0 + damping[:, None] + np.pad(sizes**2, (0, start.size - sizes.size))
         there = start + np.linalg.solve(root, ((pull / precision) @ axes).T).T
         vanishing = slice(start.size - self.vanishing, None)
@@ -235,8 +214,8 @@ class NormalApproximation:
 
     def log_evidence(self, scales: Floats) -> float:
         """Return the log-density of readings and snap-offs given scales of shape (scales,), up to a constant."""
-        known = scales.copy()
-        known[self.white.stop :] = 0.0  # a discrepancy is no white noise, from which the size of the residuals tells it
-        upper, noise = self._triangular(known[None])[0], scales[self.white]
+        upper, noise = self._triangular(scales[None])[0], scales[self.white]
         volume = np.sum(self.observations.readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
+        if self._alike is not None:
+            volume += self._alike.log_volume(noise[None], scales[None, self.white.stop :])
         return float(-0.5 * upper[-1, -1] ** 2 - volume)

@@ -130,11 +130,18 @@ class Observations(NamedTuple):
     kinds: Index  # kinds of noise, the last of which is that of snap-offs, shape (observations,)
     readings: Floats  # number of readings of each other kind
     scatter: Floats  # robust standard deviation of these readings from those at the centre
+    # Unit vectors along which the readings of each other kind are combined, shape (observations, samples, channels),
+    # and whether samples have such readings, shape (samples,).
+    axes: list[Floats]
+    used: Flags
 
 
-def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> Observations:
+def linearised(
+    observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats, alike: Floats | float = 0.0
+) -> Observations:
     """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
-    Differences along the parameters give rough slopes, and steps along their singular vectors better ones."""
+    Differences along the parameters give rough slopes, and steps along their singular vectors better ones. A
+    discrepancy has the standard deviations `alike`, (samples, 3), over the noise of the load cell."""
     model = observer.model
     family = model.family
     assert isinstance(family, ShapeFreeFamily)
@@ -145,8 +152,9 @@ def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: F
     centre = np.append(centre[: vanishing.start], np.maximum(centre[vanishing], _LARGEST_STEP * units[vanishing]))
     noises = scales[white_scales(model)]
 
-    def differences(axes: Floats, steps: Floats) -> tuple[list[_Lines], list[float]]:
-        """Return the lines along axes, for each kind of noise and for snap-offs, and the scatter of each kind."""
+    def differences(axes: Floats, steps: Floats) -> tuple[list[_Lines], list[float], Flags]:
+        """Return the lines along axes, for each kind of noise and for snap-offs, the scatter of each kind, and the
+        samples that have slopes."""
         moves = steps[:, None] * axes * units
         points = np.concatenate([centre + moves, centre - moves, centre[None]])
         contours = family.smooth(points[:, :nodes], *points[:, nodes:first_of_rig].T)
@@ -157,23 +165,25 @@ def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: F
         for chosen, noise in zip(model.noise_columns, noises, strict=True):
             of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
             scatter.append(robust_deviation(of_kind[-1]))
-            of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
+            usual = np.hypot(noise, np.broadcast_to(alike, residual.shape[1:])[smooth][:, chosen].ravel())
+            of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * usual / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
             lines.append(_Lines.of(of_kind, steps, axes))
-        return [*lines, _Lines.of(late, steps, axes)], scatter
+        return [*lines, _Lines.of(late, steps, axes)], scatter, smooth
 
     axes = np.eye(centre.size)
-    lines, scatter = differences(axes, np.full(centre.size, _STEP))
+    lines, scatter, used = differences(axes, np.full(centre.size, _STEP))
     for _ in range(_FURTHER_DIFFERENCES):
         every = [line.slopes / noise for line, noise in zip(lines, (*noises, 1.0), strict=True)]
         upper = np.linalg.qr(np.concatenate([*every, np.zeros(axes.shape)]), mode="r")
         _, sizes, axes = np.linalg.svd(upper)
-        lines, scatter = differences(axes, 1.0 / np.maximum(sizes, 1.0 / _LARGEST_STEP))
-    observed = [line.condensed() for line in lines]
+        lines, scatter, used = differences(axes, 1.0 / np.maximum(sizes, 1.0 / _LARGEST_STEP))
+    observed, along = zip(*(line.condensed() for line in lines), strict=True)
     kinds = np.repeat(np.arange(len(observed)), [len(line.values) for line in observed])
     slopes = np.concatenate([line.slopes for line in observed]) / units
     values = slopes @ centre + np.concatenate([line.values for line in observed])
     counts = [float(line.values.size) for line in lines[:-1]]
-    return Observations(slopes, values, kinds, np.array(counts), np.array(scatter))
+    each = [axes.reshape(len(axes), -1, len(c)) for axes, c in zip(along, model.noise_columns, strict=False)]
+    return Observations(slopes, values, kinds, np.array(counts), np.array(scatter), each, used)
 
 
 class _Lines(NamedTuple):
@@ -192,12 +202,18 @@ class _Lines(NamedTuple):
         change = np.where(finite, residual[:size] - residual[size:-1], 0.0) / (2.0 * steps[:, None])
         return cls(change.T @ axes, -np.where(finite, residual[-1], 0.0))
 
-    def condensed(self) -> _Lines:
-        """Return combinations that carry all information, by singular value decomposition."""
+    def condensed(self) -> tuple[_Lines, Floats]:
+        """Return combinations that carry all information, by singular value decomposition, and the unit vectors along
+        which they are, (combinations, n)."""
         axes, sizes, across = np.linalg.svd(self.slopes, full_matrices=False)
         significant = sizes > _MIN_CHANGE
-        explained = axes[:, significant].T @ self.values
+        along = axes[:, significant]
+        explained = along.T @ self.values
         # The norm of the unexplained residual, with slopes of zero, informs the noise scale.
-        rest = np.sqrt(max(float(self.values @ self.values - explained @ explained), 0.0))
-        combined = sizes[significant, None] * across[significant]
-        return _Lines(np.vstack([combined, np.zeros(across.shape[1])]), np.append(explained, rest))
+        left = self.values - along @ explained
+        rest = float(np.linalg.norm(left))
+        combined = _Lines(
+            np.vstack([sizes[significant, None] * across[significant], np.zeros(across.shape[1])]),
+            np.append(explained, rest),
+        )
+        return combined, np.vstack([along.T, left / max(rest, 1e-300)])

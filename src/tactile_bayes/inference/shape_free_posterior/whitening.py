@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -13,6 +15,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.densities import untruncated
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
 from tactile_bayes.inference.shape_free_posterior.observations import (
     LinearPrior,
@@ -78,6 +81,14 @@ class Whitening(Coordinates):
         normal = (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled
         numbers = self.approximation.untruncated(pulled, root, normal)
         return np.hstack([np.log(scales), np.linalg.solve(self.root, (numbers - self.mean).T).T])
+
+    @property
+    def fitted(self) -> Mapping[str, Floats]:
+        return {"mean": self.mean, "root": self.root}
+
+    def adapted(self, draws: Floats) -> Whitening:
+        normal, _ = _cross_validated(draws[..., self.bent :])
+        return self.standardised(normal.mean, normal.root)
 
     def standardised(self, mean: Floats, root: Floats) -> Whitening:
         """Return the coordinates in which those after the first `bent` have been standardised by mean and root."""
@@ -161,9 +172,58 @@ def _linear_prior(model: ContourModel, rng: np.random.Generator) -> LinearPrior:
             draws[k] = column
     for k in logarithms(model):
         draws[k] = np.log(draws[k])
-    deviation = np.std(draws, axis=1)
+    mean, deviation = np.mean(draws, axis=1), np.std(draws, axis=1)
+    for k in range(len(names) - int(np.count_nonzero(model.may_vanish)), len(names)):
+        shift, more = untruncated(mean[k] / deviation[k], 1.0)
+        mean[k], deviation[k] = mean[k] + shift * deviation[k], np.sqrt(1.0 + more) * deviation[k]
     correlation = np.eye(len(names))
     if jointly:
         correlation[np.ix_(jointly, jointly)] = np.corrcoef([draws[k] for k in jointly])
     root = solve_triangular(np.linalg.cholesky(correlation), np.diag(1.0 / deviation), lower=True)
-    return LinearPrior(np.mean(draws, axis=1), deviation, root)
+    return LinearPrior(mean, deviation, root)
+
+
+_MIN_VARIANCE = 1e-3  # of these coordinates that is believed
+
+
+class _Normal(NamedTuple):
+    """Normal distribution of coordinates that should be nearly standard normal."""
+
+    mean: Floats
+    root: Floats
+
+    @classmethod
+    def fitted(cls, draws: Floats, independent: float) -> _Normal:
+        """Return the distribution fitted to draws, (n, k), as many of which as said are independent. Only principal
+        axes count whose variances differ from one by more than that number explains (Marchenko & Pastur 1967, doi
+        10.1070/SM1967v001n04ABEH001994), less their bias (Baik & Silverstein 2006, doi 10.1016/j.jmva.2005.08.003)."""
+        variances, axes = np.linalg.eigh(np.cov(draws.T))
+        variances = np.maximum(variances, _MIN_VARIANCE)  # if few walkers have moved
+        ratio = variances.size / independent
+        unlike = np.abs(np.sqrt(variances) - 1.0) > np.sqrt(ratio)
+        variances, axes = variances[unlike], axes[:, unlike]
+        twice = variances + 1.0 - ratio
+        true = 0.5 * (twice + np.sign(variances - 1.0) * np.sqrt(np.maximum(twice**2 - 4.0 * variances, 0.0)))
+        root = np.sqrt(np.maximum(true, _MIN_VARIANCE))
+        return cls(draws.mean(axis=0), np.eye(draws.shape[1]) + axes * (root - 1.0) @ axes.T)
+
+    def gain(self, draws: Floats) -> float:
+        """Return by how much the mean log-density of draws, (n, k), exceeds that of the standard normal one."""
+        squares = np.mean(np.sum(draws**2 - self.standard(draws) ** 2, axis=1))
+        return float(0.5 * squares - np.linalg.slogdet(self.root).logabsdet)
+
+    def standard(self, points: Floats) -> Floats:
+        """Return points, (…, k), standardised by this distribution."""
+        return np.asarray(np.linalg.solve(self.root, (points - self.mean)[..., None])[..., 0])
+
+
+def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
+    """Return a normal distribution fitted to draws (walkers, steps, k), and its gain for draws of other walkers. How
+    many draws are independent is the number with which a fit to each half of the walkers suits the other best."""
+    halves = [half.reshape(-1, draws.shape[-1]) for half in np.array_split(draws, 2)]
+    gains = {}
+    for number in len(draws) * 2.0 ** np.arange(-1, 8):
+        fits = [_Normal.fitted(half, 0.5 * number) for half in halves]
+        gains[number] = float(np.mean([fit.gain(other) for fit, other in zip(fits, halves[::-1], strict=True)]))
+    best = max(gains, key=gains.__getitem__)
+    return _Normal.fitted(np.concatenate(halves), best), gains[best]

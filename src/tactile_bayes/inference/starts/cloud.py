@@ -13,6 +13,7 @@ from tactile_bayes.inference.densities import ANYTHING, Ends, LogProbability
 _WIDER = 2.0  # standard deviation of the starting points over that of the posterior
 _DEFICIT = 12.0  # log-probability per parameter of a start below the best: three times the mean that _WIDER causes
 _ROUNDS = 30  # of the cross-entropy method, at most
+_POINTS, _FIRST_POINTS = 60, 600  # in each round per parameter, and at most in the first one, which is enough to judge
 _SOME = 0.05  # least share of points with a finite log-probability after the deadline
 
 
@@ -54,10 +55,10 @@ def gather(
     While most points are far less probable than the best, centre and covariance are those of the best fifth."""
     size = centre.size
     top = float(log_probability(centre[None])[0])
-    for _ in range(_ROUNDS):
+    for k in range(_ROUNDS):
         root = square_root(covariance)
         cloud = Cloud(centre, _WIDER * root, -np.inf, ends)
-        points = cloud.draw(rng, 60 * size)
+        points = cloud.draw(rng, _POINTS * size if k else min(_POINTS * size, _FIRST_POINTS))
         values = log_probability(points)
         if values.max() > top:
             top = float(values.max())

@@ -146,10 +146,10 @@ def optimum_beside(
     return search.complete(search.refine(min(tried, key=lambda one: one.cost)))
 
 
-def smooth_optimum(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Floats:
-    """Return the parameters of the best contour without roughness: a circle, with a flat side if the family has one."""
+def smooth_optima(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> list[Floats]:
+    """Return the parameters of the best contours without roughness: a circle, or one with a flat side on each flank."""
     search = _Search(model, model.draw_prior(rng, _PRIOR_DRAWS, deadline)[0], deadline)
-    return search.complete(search.smooth()).point
+    return [search.complete(found).point for found in search.smooth()]
 
 
 def cost_of_residuals(model: ContourModel, start: Mapping[str, float]) -> float:
@@ -311,8 +311,9 @@ class _Search:
             else:
                 yield place
 
-    def smooth(self) -> Optimum:
-        """Return the best contour without roughness, as the loads have it with the usual rig."""
+    def smooth(self) -> Iterator[Optimum]:
+        """Yield the best contours without roughness, as the loads have them with the usual rig, for each flank on which
+        a flat side may be."""
         family, names = self.model.family, self.model.forward_parameters
         free = [i for i, name in enumerate(names) if name in family.parameters and name not in family.roughness]
         usual = self.coordinates.of(self.usual)
@@ -327,11 +328,16 @@ class _Search:
             return self.residuals(whole(some))
 
         middle, spread, low, high = (limit[free] for limit in self.limits[:4])
-        places = islice(self._likeliest(residuals, self.drawn[:, free], middle, spread), _SMOOTH_STARTS)
-        found = optima(residuals, places, middle, spread, low, high, self.deadline)
-        best = min(found, key=lambda one: one.cost)
         covariance = np.diag(np.square(self.spread))
-        return Optimum(whole(best.point[None])[0], covariance, best.residuals, best.cost)
+        flank = np.sign(self.drawn[:, names.index("flat_slope")]) if "flat_slope" in names else np.ones(len(self.drawn))
+        for side in (sides := np.unique(flank)):
+            drawn = self.drawn[flank == side]
+            places = islice(self._likeliest(residuals, drawn[:, free], middle, spread), _SMOOTH_STARTS // len(sides))
+            found = optima(residuals, places, middle, spread, low, high, self.deadline)
+            best = min(found, key=lambda one: one.cost)
+            yield Optimum(whole(best.point[None])[0], covariance, best.residuals, best.cost)
+            if self.deadline.has_passed:
+                break
 
     def _at_contacts(self, found: Mapping[str, float] | None = None) -> Floats | None:
         """Return coordinates of the contour of `contact_fit`, with the usual rig."""
@@ -413,7 +419,7 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
     """Return the discrepancy that fits residuals as in `fitted_noise`, from prior draws (n, 2); empty without one."""
     if not model.noise.of_discrepancy:
         return np.empty(0)
-    largest = model.load_in_contact(point)[:, model.present]
+    largest = model.largest_in_contact(point)[:, model.present]
     squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviations[:, model.present])
     least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
     share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))

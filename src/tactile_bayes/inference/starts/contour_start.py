@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
+from tactile_bayes.distributions import quantiles_of
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.densities import LogProbability, Mixture, at_maximum, refined
+from tactile_bayes.inference.densities import Mixture, refined
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
-from tactile_bayes.inference.ensembles.moves import moves_in
-from tactile_bayes.inference.ensembles.run_state import Block, make_block
-from tactile_bayes.inference.ensembles.walkers import first_random_state
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.shape_free_posterior.observations import Observer
+from tactile_bayes.inference.shape_free_posterior.observations import Observer, scale_names, white_scales
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening, whitening_at
 from tactile_bayes.inference.starts.cloud import gather
-from tactile_bayes.inference.starts.contour_optimum import contact_fit, fitted_noise, optimum_of, smooth_optimum
+from tactile_bayes.inference.starts.contour_optimum import contact_fit, fitted_noise, optimum_of, smooth_optima
 from tactile_bayes.inference.starts.modes import Modes
 from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
@@ -32,6 +30,7 @@ from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
 # Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
 # noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
+_CENTRAL = ndtr(np.array([-1.0, 1.0]))  # probabilities whose quantiles are two standard deviations apart
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
 _SEARCHES = 3  # for an optimum, if these draws do not lead to a mode, either
@@ -106,7 +105,7 @@ class _Start(NamedTuple):
         model, rng, deadline = self.model, self.rng, self.deadline
         by_contacts = contact_fit(model)
         if by_contacts is None:
-            yield [smooth_optimum(model, rng, deadline)]
+            yield smooth_optima(model, rng, deadline)
             yield [optimum_of(model, rng, deadline).point]
             return
         of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
@@ -118,14 +117,11 @@ class _Start(NamedTuple):
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
         """Return the start around a centre, in whitening coordinates."""
-        noise, count, deadline = self.model.noise, centre.size, self.deadline
+        count, deadline = centre.size, self.deadline
         log_probability = in_coordinates(self.model.log_probability, whitening)
         spread = np.full(count, _WHITENED_SPREAD)
-        spread[: whitening.bent] = _ROUGHNESS_SPREAD
-        spread[2 : 2 + len(noise.of_white)] = _NOISE_SPREAD
-        if noise.of_discrepancy:  # which makes residuals alike, as the approximation does not know
-            whitening = _at_mode(log_probability, whitening, centre, spread, deadline)
-            log_probability, centre = in_coordinates(self.model.log_probability, whitening), whitening.middle
+        spread[: whitening.bent] = np.minimum(_ROUGHNESS_SPREAD, _widths(self.model, scale_names(self.model)))
+        spread[white_scales(self.model)] = _NOISE_SPREAD
         cloud = gather(log_probability, centre, np.diag(np.square(spread)), self.rng, deadline)
         if not cloud.is_possible:
             raise InferenceError("nothing near is possible")
@@ -140,9 +136,6 @@ class _Start(NamedTuple):
         # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
         log_evidence = float(log_probability(whitening.middle[None])[0])
         is_hopeless = _left_over_noise(self.model, whitening.centre) > _SMOOTH_FREE
-        if not (noise.of_discrepancy or is_hopeless):  # else a verdict does not need it
-            rest = slice(whitening.bent, None)
-            whitening, start = standardise(self.model.log_probability, whitening, start, rest, self.rng, deadline)
         return Walk(start, whitening, log_evidence, most_steps=_STEPS_OF_A_VERDICT if is_hopeless else None)
 
     def scattered(self) -> Walk:
@@ -184,6 +177,12 @@ class _Start(NamedTuple):
         return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, most_steps)
 
 
+def _widths(model: ContourModel, names: Sequence[str]) -> Floats:
+    """Return the standard deviations of the logarithms of sizes by their priors, from central quantiles."""
+    ends = [quantiles_of(model.priors[name], name)(_CENTRAL) for name in names]
+    return np.asarray(np.diff(np.log(ends), axis=1)[:, 0] / 2.0)
+
+
 def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:
     """Return the error that states what to check, and what to try."""
     return InferenceError(
@@ -210,11 +209,12 @@ def _residuals(model: ContourModel, point: Floats) -> Floats:
 
 
 def mean_square_left(model: ContourModel, point: Floats) -> float:
-    """Return the mean square of the residuals at a point over a coarse noise, with outliers clipped. Beside a
-    discrepancy they are those of each sample given the ones before it."""
+    """Return the mean square of the residuals at a point over a coarse noise, at least that of the data sheet, with
+    outliers clipped. Beside a discrepancy they are those of each sample given the ones before it."""
     from tactile_bayes.load_cell.kalman import given_before  # numba takes a second to load
 
-    left, noise = _residuals(model, point)[:, model.present], model.deviations[:, model.present]
+    known = np.maximum(model.deviation, model.likelihood.load_cell.noise)
+    left, noise = _residuals(model, point)[:, model.present], model.of_samples(known)[:, model.present]
     discrepancy = model.discrepancy_at(point)
     if discrepancy is not None:
         none = np.zeros(left.shape[1])
@@ -222,93 +222,3 @@ def mean_square_left(model: ContourModel, point: Floats) -> float:
         left, variance = given_before(left, noise**2, still, discrepancy.of(np.flatnonzero(model.present)))
         noise = np.sqrt(variance)
     return float(np.mean(np.minimum(np.abs(left / noise), _FARTHEST) ** 2))
-
-
-def _at_mode(
-    log_probability: LogProbability, base: Whitening, centre: Floats, spread: Floats, deadline: Deadline
-) -> Whitening:
-    """Return coordinates standardised by the curvature of the log-density at its maximum, sought from a centre."""
-    middle, root = at_maximum(log_probability, centre, np.diag(spread), deadline)
-    bent, precision = base.bent, np.linalg.inv(root @ root.T)
-    given_bent = np.linalg.cholesky(np.linalg.inv(precision[bent:, bent:]))
-    return replace(base, scales=np.exp(middle[:bent])).standardised(middle[bent:], given_bent)
-
-
-_STEPS = (40, 80, 160, 320)  # of each pilot run
-# Gain of a further change, and share of the steps that move a walker, below and above which no further run is made.
-_GOOD_GAIN, _GOOD_MOVING = 0.3, 0.55
-_MIN_VARIANCE = 1e-3  # of these coordinates that is believed
-
-
-def standardise(
-    log_probability: LogProbability,
-    base: Whitening,
-    start: Floats,
-    columns: slice,
-    rng: np.random.Generator,
-    deadline: Deadline = NEVER,
-) -> tuple[Whitening, Floats]:
-    """Return coordinates nearer to standard normal, by pilot runs, and the start, (ensembles, walkers, d), in them."""
-    random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
-    best, start, points = base, start.copy(), start[0]
-    for steps in _STEPS:
-        if deadline.has_passed:
-            break
-        density = in_coordinates(log_probability, best)
-        first = Block(points[None, None], density(points)[None, None], (random,))
-        block = make_block(density, moves_in(best), first, steps, deadline)
-        if not block.whole:
-            raise KeyboardInterrupt
-        (random,), points = block.random_states, block.samples[0, -1].copy()
-        late = np.swapaxes(block.samples[0, block.steps // 2 :], 0, 1)
-        normal, gain = _cross_validated(late[..., columns])
-        best = best.standardised(normal.mean, normal.root)
-        for each in (start, points):
-            each[..., columns] = normal.standard(each[..., columns])
-        moving = np.mean(np.any(np.diff(late, axis=1) != 0.0, axis=-1))
-        if moving > _GOOD_MOVING and gain < _GOOD_GAIN:
-            break
-    return best, start
-
-
-class _Normal(NamedTuple):
-    """Normal distribution of coordinates that should be nearly standard normal."""
-
-    mean: Floats
-    root: Floats
-
-    @classmethod
-    def fitted(cls, draws: Floats, independent: float) -> _Normal:
-        """Return the distribution fitted to draws, (n, k), as many of which as said are independent. Only principal
-        axes count whose variances differ from one by more than that number explains (Marchenko & Pastur 1967, doi
-        10.1070/SM1967v001n04ABEH001994), less their bias (Baik & Silverstein 2006, doi 10.1016/j.jmva.2005.08.003)."""
-        variances, axes = np.linalg.eigh(np.cov(draws.T))
-        variances = np.maximum(variances, _MIN_VARIANCE)  # if few walkers have moved
-        ratio = variances.size / independent
-        unlike = np.abs(np.sqrt(variances) - 1.0) > np.sqrt(ratio)
-        variances, axes = variances[unlike], axes[:, unlike]
-        twice = variances + 1.0 - ratio
-        true = 0.5 * (twice + np.sign(variances - 1.0) * np.sqrt(np.maximum(twice**2 - 4.0 * variances, 0.0)))
-        root = np.sqrt(np.maximum(true, _MIN_VARIANCE))
-        return cls(draws.mean(axis=0), np.eye(draws.shape[1]) + axes * (root - 1.0) @ axes.T)
-
-    def gain(self, draws: Floats) -> float:
-        """Return by how much the mean log-density of draws, (n, k), exceeds that of the standard normal one."""
-        squares = np.mean(np.sum(draws**2 - self.standard(draws) ** 2, axis=1))
-        return float(0.5 * squares - np.linalg.slogdet(self.root).logabsdet)
-
-    def standard(self, points: Floats) -> Floats:
-        """Return points, (…, k), standardised by this distribution."""
-        return np.asarray(np.linalg.solve(self.root, (points - self.mean)[..., None])[..., 0])
-
-
-def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
-    """Return a normal distribution fitted to draws (walkers, steps, k), and its gain for draws of other walkers. How
-    many draws are independent is the number with which a fit to each half of the walkers suits the other best."""
-    halves = [half.reshape(-1, draws.shape[-1]) for half in np.array_split(draws, 2)]
-    gains = {}
-    for number in len(draws) * 2.0 ** np.arange(-1, 8):
-        fits = [_Normal.fitted(half, 0.5 * number) for half in halves]
-        gains[number] = float(np.mean([fit.gain(other) for fit, other in zip(fits, halves[::-1], strict=True)]))
-    best = max(gains, key=gains.__getitem__)
-    return _Normal.fitted(np.concatenate(halves), best), gains[best]
