@@ -140,11 +140,10 @@ class RunState:
         """Return the state in coordinates that are fitted to the steps kept of walkers that are not lost."""
         last, before, kept = self.last, self.coordinates, np.moveaxis(self.half.samples, 1, 2)[~self.lost()]
         coordinates = before.adapted(before.of(kept.reshape(-1, kept.shape[-1])).reshape(kept.shape))
-        if coordinates is before:
-            return self
-        places = last.samples[:, -1].reshape(-1, kept.shape[-1])
-        points, growth = before.parameters(places)
+        points, growth = before.parameters(last.samples[:, -1].reshape(-1, kept.shape[-1]))
         there = coordinates.of(points)
+        if coordinates is before or not np.isfinite(there).all():
+            return self
         changed = (coordinates.parameters(there)[1] - growth).reshape(last.samples[:, 0].shape[:2])
         there, values = there.reshape(last.samples[:, :1].shape), last.log_probability[:, -1:] + changed[:, None]
         return replace(self, coordinates=coordinates, last=replace(last, samples=there, log_probability=values))

@@ -88,14 +88,14 @@ class NormalApproximation:
         self._radius = family.radius
         log_radius = self._log_radius(scales[None], linear[None])[0]
         self._centre = np.append(log_radius, linear[1 + self._count :])
-        self._alike: CorrelatedNoise | None = None
+        self._correlated: CorrelatedNoise | None = None
         if observer.model.noise.of_discrepancy:
             here = joined(observer.model, scales[None], linear[None])[0]
             largest = observer.model.largest_in_contact(here) / observer.noise
             self.observations = linearised(observer, prior, scales, self._centre, scales[self.white.stop] * largest)
             each = [largest[:, chosen] for chosen in observer.model.noise_columns]
             course, seen = observer.model.likelihood.segments.course, self.observations
-            self._alike = CorrelatedNoise(seen.axes, seen.used, course, each, scales[self.white.start :])
+            self._correlated = CorrelatedNoise(seen.axes, seen.used, course, each, scales[self.white.start :])
         else:
             self.observations = linearised(observer, prior, scales, self._centre)
         slopes = self.observations.slopes
@@ -127,8 +127,8 @@ class NormalApproximation:
         known."""
         white = scales[:, self.white]
         noise = np.hstack([white, np.ones((len(scales), 1))])[:, self.observations.kinds]
-        if self._alike is not None:
-            columns = self._alike.whitened(columns, white, scales[:, self.white.stop :])
+        if self._correlated is not None:
+            columns = self._correlated.whitened(columns, white, scales[:, self.white.stop :])
         return np.asarray(columns / noise[..., None])
 
     def _rows(self, scales: Floats) -> Floats:
@@ -216,6 +216,6 @@ class NormalApproximation:
         """Return the log-density of readings and snap-offs given scales of shape (scales,), up to a constant."""
         upper, noise = self._triangular(scales[None])[0], scales[self.white]
         volume = np.sum(self.observations.readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
-        if self._alike is not None:
-            volume += self._alike.log_volume(noise[None], scales[None, self.white.stop :])
+        if self._correlated is not None:
+            volume += self._correlated.log_volume(noise[None], scales[None, self.white.stop :])
         return float(-0.5 * upper[-1, -1] ** 2 - volume)

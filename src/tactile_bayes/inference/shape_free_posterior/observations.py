@@ -137,11 +137,11 @@ class Observations(NamedTuple):
 
 
 def linearised(
-    observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats, alike: Floats | float = 0.0
+    observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats, discrepancy: Floats | float = 0.0
 ) -> Observations:
     """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
     Differences along the parameters give rough slopes, and steps along their singular vectors better ones. A
-    discrepancy has the standard deviations `alike`, (samples, 3), over the noise of the load cell."""
+    `discrepancy` has standard deviations, (samples, 3), over the noise of the load cell."""
     model = observer.model
     family = model.family
     assert isinstance(family, ShapeFreeFamily)
@@ -165,7 +165,7 @@ def linearised(
         for chosen, noise in zip(model.noise_columns, noises, strict=True):
             of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
             scatter.append(robust_deviation(of_kind[-1]))
-            usual = np.hypot(noise, np.broadcast_to(alike, residual.shape[1:])[smooth][:, chosen].ravel())
+            usual = np.hypot(noise, np.broadcast_to(discrepancy, residual.shape[1:])[smooth][:, chosen].ravel())
             of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * usual / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
             lines.append(_Lines.of(of_kind, steps, axes))
         return [*lines, _Lines.of(late, steps, axes)], scatter, smooth
