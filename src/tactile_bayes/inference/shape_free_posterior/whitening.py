@@ -26,6 +26,7 @@ from tactile_bayes.inference.shape_free_posterior.observations import (
     scale_names,
     split,
 )
+from tactile_bayes.numerics.blocks import blocks
 
 _FAR = 4.0  # largest distance of the logarithm of a scale from its starting value; the density is zero beyond
 _LARGEST = 50.0  # bound of the logarithm of a radius, far beyond any prior
@@ -34,6 +35,7 @@ _GAINED = 0.5  # smallest gain in log-density of a round for another one to foll
 _DAMPINGS: Floats = np.power(10.0, np.arange(15))  # dampings of steps that are tried beside the full one
 _MAX_LOG_STEP = 0.7  # largest change of the logarithm of a scale in a round
 _MIN_BOUND_DISTANCE = 1e-3  # smallest distance of the logarithm of a scale from its bounds
+_AT_ONCE = 500  # points whose coordinates are computed at a time
 _DRAWS = 4000  # number of draws from a prior for its mean and standard deviation
 
 
@@ -69,12 +71,16 @@ class Whitening(Coordinates):
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Return the model's parameters, (n, parameters), and the log of the Jacobian determinant, (n,)."""
         points, growth = np.empty(coordinates.shape), np.empty(len(coordinates))
-        for part in np.array_split(np.arange(len(coordinates)), max(1, len(coordinates) // 500)):
+        for part in blocks(len(coordinates), self.root.size, _AT_ONCE):
             points[part], growth[part] = self._parameters(coordinates[part])
         return points, growth
 
     def of(self, points: Floats) -> Floats:
         """Return the coordinates of the model's parameters, (n, parameters)."""
+        return np.concatenate([self._of(points[part]) for part in blocks(len(points), self.root.size, _AT_ONCE)])
+
+    def _of(self, points: Floats) -> Floats:
+        """Return coordinates as `of` does, of all points at once."""
         scales, linear = split(self.approximation.model, points)
         linear = self.approximation.bent(scales, linear, back=True)
         pulled, root = self.approximation.conditional(scales)
