@@ -117,7 +117,7 @@ def test_mean_and_covariance_of_what_is_not_standard_normal_are_found(width):
     size, walkers = 12, 100
     axis = np.ones(size) / np.sqrt(size)
     mean, root = np.linspace(-1.0, 1.0, size), np.eye(size) + (width - 1.0) * np.outer(axis, axis)
-    found, _ = _cross_validated(mean + np.random.default_rng(1).normal(size=(walkers, 4, size)) @ root.T)
+    found = _cross_validated(mean + np.random.default_rng(1).normal(size=(walkers, 4, size)) @ root.T)
     left = np.linalg.solve(root, found.mean - mean)
     assert np.all(np.abs(left) < 5.0 / np.sqrt(walkers))
     sizes = np.linalg.svd(np.linalg.solve(root, found.root), compute_uv=False)

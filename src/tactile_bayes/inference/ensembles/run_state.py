@@ -138,11 +138,13 @@ class RunState:
 
     def adapted(self) -> RunState:
         """Return the state in coordinates that are fitted to the steps kept of walkers that are not lost."""
+        if not self.coordinates.fitted:
+            return self
         last, before, kept = self.last, self.coordinates, np.moveaxis(self.half.samples, 1, 2)[~self.lost()]
         coordinates = before.adapted(before.of(kept.reshape(-1, kept.shape[-1])).reshape(kept.shape))
         points, growth = before.parameters(last.samples[:, -1].reshape(-1, kept.shape[-1]))
         there = coordinates.of(points)
-        if coordinates is before or not np.isfinite(there).all():
+        if not np.isfinite(there).all():
             return self
         changed = (coordinates.parameters(there)[1] - growth).reshape(last.samples[:, 0].shape[:2])
         there, values = there.reshape(last.samples[:, :1].shape), last.log_probability[:, -1:] + changed[:, None]

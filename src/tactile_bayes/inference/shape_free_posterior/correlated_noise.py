@@ -82,7 +82,7 @@ def _seen(axes: Floats, used: Flags, course: Course, largest: Floats, shares: Fl
         discrepancy = Discrepancy(course, shares[:, None, None] * of_channel[:, None] * ones, lengths)
         readings = np.zeros(discrepancy.deviation.shape)
         readings[:, used] = axis.T
-        left, variance = given_before(readings, white, Zero(none, none, none, 1.0), discrepancy)
+        left, variance = given_before(readings, white, Zero.of(None, none, none), discrepancy)
         standard.append((left / np.sqrt(variance))[:, used])
         volume += 0.5 * np.log(variance[:, used, 0]).sum(axis=1)
     standard.append(np.zeros((shares.size, 1, len(axes))))  # there may be fewer readings than observations

@@ -93,7 +93,7 @@ class Whitening(Coordinates):
         return {"mean": self.mean, "root": self.root}
 
     def adapted(self, draws: Floats) -> Whitening:
-        normal, _ = _cross_validated(draws[..., self.bent :])
+        normal = _cross_validated(draws[..., self.bent :])
         return self.standardised(normal.mean, normal.root)
 
     def standardised(self, mean: Floats, root: Floats) -> Whitening:
@@ -223,8 +223,8 @@ class _Normal(NamedTuple):
         return np.asarray(np.linalg.solve(self.root, (points - self.mean)[..., None])[..., 0])
 
 
-def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
-    """Return a normal distribution fitted to draws (walkers, steps, k), and its gain for draws of other walkers. How
+def _cross_validated(draws: Floats) -> _Normal:
+    """Return a normal distribution fitted to draws (walkers, steps, k). How
     many draws are independent is the number with which a fit to each half of the walkers suits the other best."""
     halves = [half.reshape(-1, draws.shape[-1]) for half in np.array_split(draws, 2)]
     gains = {}
@@ -232,4 +232,4 @@ def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
         fits = [_Normal.fitted(half, 0.5 * number) for half in halves]
         gains[number] = float(np.mean([fit.gain(other) for fit, other in zip(fits, halves[::-1], strict=True)]))
     best = max(gains, key=gains.__getitem__)
-    return _Normal.fitted(np.concatenate(halves), best), gains[best]
+    return _Normal.fitted(np.concatenate(halves), best)

@@ -218,7 +218,7 @@ def mean_square_left(model: ContourModel, point: Floats) -> float:
     discrepancy = model.discrepancy_at(point)
     if discrepancy is not None:
         none = np.zeros(left.shape[1])
-        still = Zero(none, none, none, 1.0)
+        still = Zero.of(None, none, none)
         left, variance = given_before(left, noise**2, still, discrepancy.of(np.flatnonzero(model.present)))
         noise = np.sqrt(variance)
     return float(np.mean(np.minimum(np.abs(left / noise), _FARTHEST) ** 2))
