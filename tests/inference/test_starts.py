@@ -13,7 +13,7 @@ from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.experiment import Experiment, contour_problem
 from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of, smooth_optima
-from tactile_bayes.inference.starts.contour_start import mean_square_left
+from tactile_bayes.inference.starts.residuals import mean_square_left
 from tactile_bayes.rig import NOTHING
 
 PASSED = Deadline.after(0.0)

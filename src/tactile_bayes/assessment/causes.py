@@ -20,7 +20,7 @@ from tactile_bayes.diagnostics.findings import Finding, quantity
 from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.deadline import Deadline
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.experiment import Experiment, contour_problem, experiment_of
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.result import best_draw
@@ -80,8 +80,9 @@ def with_bends(model: ContourModel, places: tuple[float, ...]) -> ContourModel:
 
 COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
 _SECONDS = 45.0  # time limit of all searches [s], each of which takes about one, and shape-free four
-_FEWEST = 4  # causes that are sought at least, the likeliest first; then until one describes the record
-_LEAST = 0.03  # share of the log-evidence of what describes the record below which, to first order, nothing is sought
+# Share of the log-evidence to first order of what describes the record below which nothing else is sought.
+_LIKELY = 0.3
+_LEAST = 0.03  # share of the log-evidence of what describes the record, below which a shape is not looked at closely
 # Least share of what any shape explains that one spot explains, to be named in its place; and of the log-evidence of
 # what describes the record, for a shape that does not.
 _MOST = 0.5
@@ -95,7 +96,8 @@ def causes(posterior: xr.DataTree) -> xr.Dataset:
     Each unknown of the rig that is not inferred is added, a spot that is flatter or more bent is put anywhere along the
     contour, and each other family is taken. First all are judged by score tests, the derivatives of the loads at the
     most probable parameters, in milliseconds; then of the likeliest the most probable parameters are sought again,
-    about a second each, until one describes the record, for 45 s at most. Nothing is sampled.
+    about a second each, until one describes the record, and of what is nearly as likely, for 45 s at most. Nothing is
+    sampled.
 
     Parameters
     ----------
@@ -144,7 +146,7 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     misread = [finding for finding in seen.messages if _is_misread(finding)][:1]
     if misread and misread[0].kind == "no fit":
         return _of_readings(misread)
-    tests = _Tests(experiment, found, deadline or Deadline.after(_SECONDS))
+    tests = _Tests(experiment, found, deadline)
     if tests.own.fits and (outliers := [finding for finding in seen.messages if finding.kind == "outlier"]):
         return _of_readings(outliers)  # its optimum bears them, and the posterior does not
     every = [each for each in alternatives_of(experiment, seen) if each.kind != "fixed"]
@@ -191,14 +193,16 @@ class _Cause:
 class _Tests:
     """Tests of what may be wrong with an experiment, beside its most probable parameters by name."""
 
-    def __init__(self, experiment: Experiment, found: Mapping[str, float], deadline: Deadline) -> None:
+    def __init__(self, experiment: Experiment, found: Mapping[str, float], deadline: Deadline | None) -> None:
         self.experiment, self.deadline = experiment, deadline
         self.missed: list[str] = []  # names of those that were not sought for lack of time
-        self.known = -np.inf  # largest log-evidence of those that describe the record
+        self.known = self.likely = -np.inf  # log-evidences, by what describes the record, from which others are sought
         self.model = contour_problem(experiment).model
         stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
         of_contour = {name: found[name] for name in self.model.family.parameters}
-        self.own = optimum_beside(self.model, [found, of_contour], deadline)  # a wrong model may have a far-off rig
+        self.own = optimum_beside(
+            self.model, [found, of_contour], deadline or NEVER
+        )  # a wrong model may have a far-off rig
         best = dict(zip(self.model.names, self.own.point.tolist(), strict=True))
         self.starts = [{**stated, **best}, {**stated, **found}, best]  # what is added as stated, and at its median
 
@@ -262,18 +266,22 @@ class _Tests:
         return replace(shape, name=f"{'flat spot' if is_flat else 'corner'} at x = {place}")
 
     def sought(self, causes: list[_Cause]) -> list[_Cause]:
-        """Return causes with their optima, the likeliest to first order first, unless others are far likelier."""
+        """Return causes with their optima, the likeliest to first order first, unless others are likelier."""
         rows: list[_Cause] = []
-        for number, each in enumerate(sorted(causes, key=lambda one: -one.log_evidence)):
-            least = _LEAST * self.known if number < _FEWEST else self.known
+        self.deadline = self.deadline or Deadline.after(_SECONDS)  # begins once all has been compiled
+        for each in sorted(causes, key=lambda one: -one.log_evidence):
             if self.deadline.has_passed:
                 self.missed.append(each.name)
-            elif each.log_evidence >= least:
+            elif each.log_evidence > min(self.known, self.likely):
                 with suppress(TactileBayesError):
-                    found = optimum_beside(each.model, each.starts, self.deadline)
+                    # Beside what describes the record, one that does not at once is none of the likeliest.
+                    most = None if np.isneginf(self.known) else 1
+                    found = optimum_beside(each.model, each.starts, self.deadline, most)
                     gain = found.log_evidence - self.own.log_evidence + each.more
                     rows.append(replace(each, log_evidence=gain, describes=int(found.fits), point=found.point))
-                    self.known = max(self.known, gain if found.fits else -np.inf)
+                    if found.fits:
+                        self.known = max(self.known, gain)
+                        self.likely = max(self.likely, _LIKELY * each.log_evidence)
                 continue
             if np.isfinite(each.log_evidence):
                 rows.append(each)

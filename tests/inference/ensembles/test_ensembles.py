@@ -381,12 +381,15 @@ def test_few_lost_walkers_are_taken_back_and_many_stay(count, stay):
         np.testing.assert_array_equal(last.log_probability[0, -1], -0.5 * last.samples[0, -1, :, 0] ** 2)
 
 
-@pytest.mark.parametrize(("step", "lost"), [(0, 0), (10, 0), (11, 1), (20, 1)])
-def test_a_walker_was_lost_while_a_step_before_it_was_taken_back_is_kept(step, lost):
-    """Of 20 steps, whose second half is kept."""
+@pytest.mark.parametrize(("step", "kept", "lost"), [(0, 10, 0), (10, 10, 0), (11, 9, 0), (19, 1, 0), (20, 10, 1)])
+def test_steps_before_a_walker_was_taken_back_are_left_out(step, kept, lost):
+    """Of 20 steps the second half is kept, and the whole of it if there is nothing after that walker's return."""
     samples = np.random.default_rng(1).normal(size=(2, 20, 48, 1))
     values = -0.5 * samples[..., 0] ** 2
     state = RunState.begin(Coordinates(), Block(samples[:, :1], values[:, :1], ()))
-    state = state.append(Block(samples, values, ())).halved()
+    state = state.append(Block(samples, values, ()))
     state.taken_back[0, 5] = step
+    state = state.halved()
+    np.testing.assert_array_equal(state.half.samples, samples[:, 20 - kept :])
+    assert state.half.moved.shape[1] == kept
     assert np.count_nonzero(state.were_lost()) == lost

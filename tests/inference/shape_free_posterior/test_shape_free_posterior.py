@@ -18,7 +18,7 @@ from tactile_bayes.inference.shape_free_posterior.normal_approximation import An
 from tactile_bayes.inference.shape_free_posterior.observations import Observer, linear_names
 from tactile_bayes.inference.shape_free_posterior.whitening import _cross_validated, _linear_prior, whitening_at
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
-from tactile_bayes.inference.starts.contour_start import mean_square_left
+from tactile_bayes.inference.starts.residuals import mean_square_left
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.rig.rig_prior import RigPrior

@@ -80,10 +80,11 @@ class Checkpoint:
             places, values = arrays["places"], arrays["densities"]
             last = Block(places[:, None], values[:, None], tuple(map(tuple, self._random_states)))
             half = StoredSteps(*(arrays[name] for name in ("numbers", "samples", "log_probability", "moved")))
-            if places.shape != shape or half.moved.shape[1] != self._steps - self._steps // 2:
-                raise ValueError(f"it has places of shape {places.shape} after {half.moved.shape[1]} steps")
             coordinates = coordinates.refitted({name: arrays[_FITTED + name] for name in coordinates.fitted})
-            return RunState(coordinates, last, self._steps, (half,), arrays["taken_back"])
+            state = RunState(coordinates, last, self._steps, (half,), arrays["taken_back"])
+            if places.shape != shape or half.moved.shape[1] != state.kept:
+                raise ValueError(f"it has places of shape {places.shape} after {half.moved.shape[1]} steps")
+            return state
 
     def write(self, state: RunState, seconds: float, *, is_end: bool = False) -> None:
         """Store a state that was reached after `seconds` [s] of the whole run; if it is no end, only now and then."""

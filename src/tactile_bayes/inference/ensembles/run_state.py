@@ -112,18 +112,24 @@ class RunState:
         part = StoredSteps(numbers[stored], points.reshape(samples.shape), values, moved)
         return replace(after, parts=(*self.parts, part))
 
+    @property
+    def kept(self) -> int:
+        """Number of steps that are kept: the second half, less those before a walker was last taken back, if any."""
+        since = self.steps - int(self.taken_back.max(initial=0))
+        return min(self.steps - self.steps // 2, since if since >= self.every else self.steps)
+
     def halved(self) -> RunState:
-        """Return the state with the second half of its steps as the only part."""
+        """Return the state with the steps that are kept as the only part."""
         numbers, *columns = zip(*self.parts, strict=True)
         number = np.concatenate(numbers)
         samples, values, moved = (np.concatenate(column, axis=1) for column in columns)
-        kept = (number > self.steps // 2) & (number % self.every == 0)
-        moved = moved[:, moved.shape[1] - (self.steps - self.steps // 2) :]
+        kept = (number > self.steps - self.kept) & (number % self.every == 0)
+        moved = moved[:, moved.shape[1] - self.kept :]
         return replace(self, parts=(StoredSteps(number[kept], samples[:, kept], values[:, kept], moved),))
 
     @property
     def half(self) -> StoredSteps:
-        """The second half of the steps, of a state from `halved`."""
+        """The steps that are kept, of a state from `halved`."""
         (half,) = self.parts
         return half
 
@@ -134,7 +140,7 @@ class RunState:
     def were_lost(self) -> Flags:
         """Return True for walkers with steps kept in which they were lost, (chain, walker)."""
         earlier = lost_walkers(self.half.values[:, : self.half.values.shape[1] // 2])
-        return earlier | self.lost() | (self.taken_back > self.steps // 2)
+        return earlier | self.lost() | (self.taken_back > self.steps - self.kept)
 
     def adapted(self) -> RunState:
         """Return the state in coordinates that are fitted to the steps kept of walkers that are not lost."""

@@ -102,11 +102,11 @@ def sample(
     """Draw from a posterior with independent ensembles of walkers, which propose from one another, until they agree.
 
     `start`, (ensembles, walkers, parameters), in the coordinates, should be wider than the posterior, or R̂ cannot
-    distinguish a part of it from the whole. The second half of the steps is diagnosed after `block_steps`, and whenever
-    their number has grown by a quarter (Vehtari et al. 2021, doi 10.1214/20-BA1221): the run stops when settings are
-    satisfied, with five effective draws per walker on average, three in the tails, and no walker lost. A
-    KeyboardInterrupt after the first step ends it. With a checkpoint a run resumes, bit by bit; `identity` states what
-    determines the log-probability.
+    distinguish a part of it from the whole. The second half of the steps, or those since a lost walker was taken back,
+    is diagnosed after `block_steps`, and whenever their number has grown by a quarter (Vehtari et al. 2021, doi
+    10.1214/20-BA1221): the run stops when settings are satisfied, with five effective draws per walker on average,
+    three in the tails, and no walker lost. A KeyboardInterrupt after the first step ends it. With a checkpoint a run
+    resumes, bit by bit; `identity` states what determines the log-probability.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
@@ -197,7 +197,7 @@ class _Run:
             self.is_late = self.deadline.has_passed
 
     def diagnose(self) -> None:
-        """Diagnose the second half of the steps, and say whether the run ends, or when it is diagnosed next."""
+        """Diagnose the steps that are kept, and say whether the run ends, or when it is diagnosed next."""
         settings = self.settings
         self.state = self.state.halved()
         self.diagnosis = found = Diagnosis(self.state.half.samples)
@@ -217,7 +217,7 @@ class _Run:
         self.due = next_diagnosis(self.steps, settings.block_steps)
 
     def draws(self) -> Draws:
-        """Return the second half of a run that has ended, with the message on its end."""
+        """Return the steps kept of a run that has ended, with the message on its end."""
         state, found, settings, names = self.state, self.diagnosis, self.settings, tuple(self.target.names)
         assert found is not None
         chains, _, walkers, _ = state.last.samples.shape

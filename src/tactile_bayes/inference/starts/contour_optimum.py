@@ -134,16 +134,18 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
 
 
 def optimum_beside(
-    model: ContourModel, starts: Sequence[Mapping[str, float]], deadline: Deadline = NEVER
+    model: ContourModel, starts: Sequence[Mapping[str, float]], deadline: Deadline = NEVER, most: int | None = None
 ) -> ContourOptimum:
-    """Return the best of the optima from starts by name, for a contour of its family, and from Step 2's contacts."""
+    """Return the best of the optima from starts by name, for a contour of its family, and from Step 2's contacts; with
+    a number, of the first so many that there are."""
     search = _Search(model, _prior_quantiles(model), deadline)
     tried: list[Optimum] = []
-    for found in optima(search.residuals, search.beside(starts), *search.limits):
+    for found in optima(search.residuals, islice(search.beside(starts), most), *search.limits):
         tried.append(found)
         if found.fits or are_alike(tried):
             break
-    return search.complete(search.refine(min(tried, key=lambda one: one.cost)))
+    best = min(tried, key=lambda one: one.cost)
+    return search.complete(search.refine(best) if most is None else best)
 
 
 def smooth_optima(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> list[Floats]:

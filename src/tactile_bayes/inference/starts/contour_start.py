@@ -24,8 +24,8 @@ from tactile_bayes.inference.shape_free_posterior.whitening import Whitening, wh
 from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, fitted_noise, optimum_of, smooth_optima
 from tactile_bayes.inference.starts.modes import Modes
-from tactile_bayes.load_cell.drift import Zero
-from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
+from tactile_bayes.inference.starts.residuals import left_over_noise, mean_square_left
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
 # Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
 # noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
@@ -34,10 +34,9 @@ _CENTRAL = ndtr(np.array([-1.0, 1.0]))  # probabilities whose quantiles are two 
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
 _SEARCHES = 3  # for an optimum, if these draws do not lead to a mode, either
-_FARTHEST = 5.0  # standard deviations at which residuals are clipped: a sample beside an event may be loaded or not
-# Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a family and
-# of a shape-free contour, which follows what families do not; and the steps that a verdict needs.
-_SMOOTH, _SMOOTH_FREE, _STEPS_OF_A_VERDICT = 2.5, 1.4, 50
+# Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a shape-free
+# contour, which follows what families do not; and the steps that a verdict needs.
+_SMOOTH_FREE, _STEPS_OF_A_VERDICT = 1.4, 50
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
 
 
@@ -135,22 +134,22 @@ class _Start(NamedTuple):
         )
         # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
         log_evidence = float(log_probability(whitening.middle[None])[0])
-        is_hopeless = _left_over_noise(self.model, whitening.centre) > _SMOOTH_FREE
+        is_hopeless = left_over_noise(self.model, whitening.centre) > _SMOOTH_FREE
         return Walk(start, whitening, log_evidence, most_steps=_STEPS_OF_A_VERDICT if is_hopeless else None)
 
     def scattered(self) -> Walk:
         """Return walkers scattered twice as widely as normal approximations of the modes, which serve as proposals."""
         model, rng, deadline = self.model, self.rng, self.deadline
-        modes = Modes(model, rng, deadline).found_by_search()
+        search = Modes(model, rng, deadline)
+        modes = search.found_by_search()
         if any(mode.coordinates is not modes[0].coordinates for mode in modes):
             modes = [mode.usual or mode for mode in modes]
         common = modes[0].coordinates
         target = in_coordinates(model.log_probability, common)
         first = modes[0].optimum
-        is_hopeless = not first.fits and _left_over_noise(model, first.point) > _SMOOTH
         proposal = Mixture(tuple(mode.proposal for mode in modes))
         shares = proposal.shares
-        if not is_hopeless:  # else a verdict does not need it
+        if not search.is_hopeless:  # else a verdict does not need it
             refined_ones = (refined(target, mode.proposal, rng, deadline) for mode in modes)
             proposal = Mixture(tuple(part for each in refined_ones for part in each.parts))
 
@@ -173,7 +172,7 @@ class _Start(NamedTuple):
             raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
         coordinates = replace(common, proposal=proposal)
         log_evidence = float(logsumexp([part.log_mass for part in proposal.parts]))
-        most_steps = _STEPS_OF_A_VERDICT if is_hopeless else None
+        most_steps = _STEPS_OF_A_VERDICT if search.is_hopeless else None
         return Walk(coordinates.of(start), coordinates, log_evidence, first.beyond, most_steps)
 
 
@@ -190,35 +189,3 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
         "tactile-bayes inspect checks them. "
         + what_to_try([model.family.name], model.unknowns.names, friction=model.unknowns.friction)
     )
-
-
-def _left_over_noise(model: ContourModel, best: Floats) -> float:
-    """Return the largest root mean square of a channel's residuals at the best parameters, over the noise between
-    neighbouring ones; 0 if what wanders, or is off by what is integrated out, is inferred, which is no misfit."""
-    cell = model.noise.cell
-    if model.noise.of_discrepancy or cell.drift is not None or any(cell.bias_uncertainty):
-        return 0.0
-    left, noise = _residuals(model, best)[:, model.present], model.deviation[model.present]
-    rough = np.maximum([rough_noise(channel) for channel in left.T], noise)
-    return float(np.sqrt(np.mean(np.minimum(np.abs(left / rough), _FARTHEST) ** 2, axis=0)).max())
-
-
-def _residuals(model: ContourModel, point: Floats) -> Floats:
-    cell = model.likelihood.load_cell
-    return np.asarray(model.likelihood.measured - cell.cut(cell.expected(model.loads(point[None])))[0])
-
-
-def mean_square_left(model: ContourModel, point: Floats) -> float:
-    """Return the mean square of the residuals at a point over a coarse noise, at least that of the data sheet, with
-    outliers clipped. Beside a discrepancy they are those of each sample given the ones before it."""
-    from tactile_bayes.load_cell.kalman import given_before  # numba takes a second to load
-
-    known = np.maximum(model.deviation, model.likelihood.load_cell.noise)
-    left, noise = _residuals(model, point)[:, model.present], model.of_samples(known)[:, model.present]
-    discrepancy = model.discrepancy_at(point)
-    if discrepancy is not None:
-        none = np.zeros(left.shape[1])
-        still = Zero.of(None, none, none)
-        left, variance = given_before(left, noise**2, still, discrepancy.of(np.flatnonzero(model.present)))
-        noise = np.sqrt(variance)
-    return float(np.mean(np.minimum(np.abs(left / noise), _FARTHEST) ** 2))

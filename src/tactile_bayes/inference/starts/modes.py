@@ -24,6 +24,7 @@ from tactile_bayes.inference.densities import (
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather, square_root
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, are_alike, optima_of
+from tactile_bayes.inference.starts.residuals import left_over_noise
 
 _MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
 _MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a record of few loaded samples
@@ -39,6 +40,8 @@ _MODE_RADIUS = 3.0  # distance from a mode, over that of typical points of its p
 _MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw in ten thousand
 # First round that counts of an adaptation from the curvature, whose own draws may leave out a tail, and seem efficient.
 _BY_CURVATURE = 3
+# Root mean square of a channel's residuals at the best optimum, over the noise of neighbours, that no noise explains.
+_SMOOTH = 2.5
 _EXTENT_DRAWS = 500  # from which the extent of a proposal is estimated
 
 
@@ -58,12 +61,16 @@ class Modes:
     def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
         self.model, self.rng, self.deadline = model, rng, deadline
         self.found: list[PosteriorMode] = []
+        self.is_hopeless = False  # True if no noise explains what the best optimum leaves
         self._own = model.coordinates
 
     def found_by_search(self) -> list[PosteriorMode]:
-        """Return modes, that with the most mass first: one if it explains many loaded samples, else all of mass."""
-        found = self.found
-        for optimum in sorted(self._not_explaining(), key=lambda one: one.cost):
+        """Return modes, that with the most mass first: one if it explains many loaded samples, or if none is worth a
+        look, else all of mass."""
+        others, found = sorted(self._not_explaining(), key=lambda one: one.cost), self.found
+        if not found and others and left_over_noise(self.model, others[0].point) > _SMOOTH:
+            self.is_hopeless, others = True, others[:1]
+        for optimum in others:
             least = min((mode.optimum.cost for mode in found), default=optimum.cost)
             late = found and self.deadline.has_passed
             if optimum.cost < least + _MAX_EXCESS_COST and not late and not self._is_known(optimum):
