@@ -80,8 +80,9 @@ def with_bends(model: ContourModel, places: tuple[float, ...]) -> ContourModel:
 
 COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
 _SECONDS = 45.0  # time limit of all searches [s], each of which takes about one, and shape-free four
-# Share of the log-evidence to first order of what describes the record below which nothing else is sought.
-_LIKELY = 0.3
+# Share of the log-evidence to first order of what describes the record below which nothing else is sought, and number
+# of the likeliest causes that are sought from all places if nothing describes it.
+_LIKELY, _CLOSELY = 0.3, 4
 _LEAST = 0.03  # share of the log-evidence of what describes the record, below which a shape is not looked at closely
 # Least share of what any shape explains that one spot explains, to be named in its place; and of the log-evidence of
 # what describes the record, for a shape that does not.
@@ -159,7 +160,7 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     rows += tests.sought(tests.judged(alternatives_by_channel(experiment, better)))
     if misread and not (tests.own.fits or any(row.describes for row in rows)):  # nothing lies below the pivot
         return _of_readings(misread)
-    rows.sort(key=lambda row: row.rank)
+    rows.sort(key=_rank)
     columns = {name: ("cause", [getattr(row, name) for row in rows]) for name in COLUMNS_OF_CAUSES}
     attrs = {"described": int(tests.own.fits), "no_time_for": ", ".join(tests.missed)}
     return xr.Dataset(columns, coords={"cause": [row.name for row in rows]}, attrs=attrs)
@@ -185,9 +186,10 @@ class _Cause:
         """1 if the optimum was sought, else 0."""
         return int(self.point is not None)
 
-    @property
-    def rank(self) -> tuple[bool, float]:
-        return not self.describes, -self.log_evidence
+
+def _rank(row: _Cause) -> tuple[bool, float]:
+    """Place among others: those that describe the record first."""
+    return not row.describes, -row.log_evidence
 
 
 class _Tests:
@@ -266,26 +268,34 @@ class _Tests:
         return replace(shape, name=f"{'flat spot' if is_flat else 'corner'} at x = {place}")
 
     def sought(self, causes: list[_Cause]) -> list[_Cause]:
-        """Return causes with their optima, the likeliest to first order first, unless others are likelier."""
+        """Return causes with their optima: the likeliest to first order first, each from one place, and unless others
+        are likelier; if none describes the record, the likeliest then from all places."""
         rows: list[_Cause] = []
         self.deadline = self.deadline or Deadline.after(_SECONDS)  # begins once all has been compiled
         for each in sorted(causes, key=lambda one: -one.log_evidence):
+            found = each
             if self.deadline.has_passed:
                 self.missed.append(each.name)
             elif each.log_evidence > min(self.known, self.likely):
-                with suppress(TactileBayesError):
-                    # Beside what describes the record, one that does not at once is none of the likeliest.
-                    most = None if np.isneginf(self.known) else 1
-                    found = optimum_beside(each.model, each.starts, self.deadline, most)
-                    gain = found.log_evidence - self.own.log_evidence + each.more
-                    rows.append(replace(each, log_evidence=gain, describes=int(found.fits), point=found.point))
-                    if found.fits:
-                        self.known = max(self.known, gain)
-                        self.likely = max(self.likely, _LIKELY * each.log_evidence)
-                continue
-            if np.isfinite(each.log_evidence):
-                rows.append(each)
-        return sorted(rows, key=lambda row: row.rank)
+                found = self._sought(each, 1)
+                if found.describes:
+                    self.known = max(self.known, found.log_evidence)
+                    self.likely = max(self.likely, _LIKELY * each.log_evidence)
+            rows.append(found)
+        rows.sort(key=_rank)
+        if np.isneginf(self.known):
+            again = [self._sought(row) for row in rows[:_CLOSELY] if not self.deadline.has_passed]
+            rows = [*(min(pair, key=_rank) for pair in zip(rows, again, strict=False)), *rows[len(again) :]]
+            self.known = max((row.log_evidence for row in rows if row.describes), default=-np.inf)
+        return sorted((row for row in rows if np.isfinite(row.log_evidence)), key=_rank)
+
+    def _sought(self, cause: _Cause, most: int | None = None) -> _Cause:
+        """Return a cause with its optimum, from the first so many places or from all; as it is if it has none."""
+        with suppress(TactileBayesError):
+            found = optimum_beside(cause.model, cause.starts, self.deadline or NEVER, most)
+            gain = found.log_evidence - self.own.log_evidence + cause.more
+            return replace(cause, log_evidence=gain, describes=int(found.fits), point=found.point)
+        return cause
 
 
 def _least(shape: _Cause) -> float:

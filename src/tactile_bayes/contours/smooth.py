@@ -119,13 +119,15 @@ class Smooth(Tabled):
         there = np.flatnonzero((table[row, 0, 0] <= goal) & (goal <= table[row, -1, 0]))
         row, first, goal = row[there], np.minimum(first[there], cells - 1), goal[there]
         left, right = table[row, first], table[row, first + 1]
+        terms = _polynomial(left[:, ::2], right[:, ::2])
 
         def short_of(i: Index, t: Floats) -> tuple[Floats, Floats]:
-            at, _, rate, _ = _between(left[i], right[i], t)
+            at, rate = _value_and_rate(terms[:, i], t)
             return goal[i] - at, -rate
 
         found = np.full(beyond.shape, np.nan)
-        way = first + falling_root(short_of, np.zeros(there.size), np.ones(there.size))
+        start = (goal - left[:, 0]) / (right[:, 0] - left[:, 0])
+        way = first + falling_root(short_of, np.zeros(there.size), np.ones(there.size), start)
         found[there] = way * (2.0 * _UPRIGHT / cells) - _UPRIGHT
         return found.reshape(shape)
 
@@ -172,16 +174,23 @@ def _grid(count: int, cells: int) -> tuple[Floats, Floats, Floats]:
 
 def _between(left: Floats, right: Floats, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """x, y and their rates at a share t of a cell, by polynomials of fifth degree between its ends."""
-    out = []
-    for axis in range(2):
-        start, rate, bend = (left[..., axis + k] for k in (0, 2, 4))
-        rise = right[..., axis] - start - rate - 0.5 * bend
-        rate_rise = right[..., axis + 2] - rate - bend
-        bend_rise = right[..., axis + 4] - bend
-        c = 10.0 * rise - 4.0 * rate_rise + 0.5 * bend_rise
-        d = -15.0 * rise + 7.0 * rate_rise - bend_rise
-        e = 6.0 * rise - 3.0 * rate_rise + 0.5 * bend_rise
-        out.append(start + t * (rate + t * (0.5 * bend + t * (c + t * (d + t * e)))))
-        out.append(rate + t * (bend + t * (3.0 * c + t * (4.0 * d + t * 5.0 * e))))
-    x, x_rate, y, y_rate = out
+    (x, x_rate), (y, y_rate) = (_value_and_rate(_polynomial(left[..., k::2], right[..., k::2]), t) for k in range(2))
     return x, y, x_rate, y_rate
+
+
+def _polynomial(left: Floats, right: Floats) -> Floats:
+    """Coefficients of fifth degree, (6, ...), from value, rate and bend at the ends, (..., 3)."""
+    start, rate, bend = np.moveaxis(left, -1, 0)
+    rise = right[..., 0] - start - rate - 0.5 * bend
+    rate_rise = right[..., 1] - rate - bend
+    bend_rise = right[..., 2] - bend
+    c = 10.0 * rise - 4.0 * rate_rise + 0.5 * bend_rise
+    d = -15.0 * rise + 7.0 * rate_rise - bend_rise
+    e = 6.0 * rise - 3.0 * rate_rise + 0.5 * bend_rise
+    return np.stack([start, rate, 0.5 * bend, c, d, e])
+
+
+def _value_and_rate(terms: Floats, t: Floats) -> tuple[Floats, Floats]:
+    start, rate, half_bend, c, d, e = terms
+    value = start + t * (rate + t * (half_bend + t * (c + t * (d + t * e))))
+    return value, rate + t * (2.0 * half_bend + t * (3.0 * c + t * (4.0 * d + t * 5.0 * e)))

@@ -21,6 +21,7 @@ from tactile_bayes.record import COLUMNS
 from tactile_bayes.uncertainty.offsets import Moves, aligned, feet_of, heights_of, most_central, normal_offsets
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach, reach
 
+_MOVED = 1000  # contours of a band after each is moved onto the most central one, about as many as effective draws
 _DRAWS = 4000
 _ROUNDING = 1e-9  # share of its largest width below which a band is so narrow that its draws differ only by rounding
 
@@ -189,7 +190,7 @@ def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Fl
 
 def _aligned_heights(posterior: xr.DataTree, x: Floats, align: str) -> Floats:
     """Heights at x of contours moved onto the most central one; shape (contours, x)."""
-    contours = contours_drawn(posterior)
+    contours = contours_drawn(posterior, _MOVED)
     reference = most_central(contours, x)
     feet, moves = feet_of(reference, x), _moves_onto(reference, contours, posterior, x, align)
     if align == "translation":
