@@ -80,8 +80,8 @@ def with_bends(model: ContourModel, places: tuple[float, ...]) -> ContourModel:
 
 COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
 _SECONDS = 45.0  # time limit of all searches [s], each of which takes about one, and shape-free four
-# Share of the log-evidence to first order of what describes the record below which nothing else is sought, and number
-# of the likeliest causes that are sought from all places if nothing describes it.
+# Share of the log-evidence to first order of what describes the record below which nothing else is sought, and of what
+# does not, above which that is a surprise; and number of the likeliest causes that are then sought from all places.
 _LIKELY, _CLOSELY = 0.3, 4
 _LEAST = 0.03  # share of the log-evidence of what describes the record, below which a shape is not looked at closely
 # Least share of what any shape explains that one spot explains, to be named in its place; and of the log-evidence of
@@ -96,9 +96,9 @@ def causes(posterior: xr.DataTree) -> xr.Dataset:
 
     Each unknown of the rig that is not inferred is added, a spot that is flatter or more bent is put anywhere along the
     contour, and each other family is taken. First all are judged by score tests, the derivatives of the loads at the
-    most probable parameters, in milliseconds; then of the likeliest the most probable parameters are sought again,
-    about a second each, until one describes the record, and of what is nearly as likely, for 45 s at most. Nothing is
-    sampled.
+    most probable parameters, in milliseconds; then the most probable parameters with the likeliest are sought, less
+    than a second each, until one describes the record, and with those that are nearly as likely. If none does, the
+    four likeliest are sought again, from more places. This takes 45 s at most; nothing is sampled.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     return xr.Dataset(columns, coords={"cause": [row.name for row in rows]}, attrs=attrs)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Cause:
     """What may be wrong, and what it explains, to first order until it is sought."""
 
@@ -198,7 +198,7 @@ class _Tests:
     def __init__(self, experiment: Experiment, found: Mapping[str, float], deadline: Deadline | None) -> None:
         self.experiment, self.deadline = experiment, deadline
         self.missed: list[str] = []  # names of those that were not sought for lack of time
-        self.known = self.likely = -np.inf  # log-evidences, by what describes the record, from which others are sought
+        self.known = self.likely = -np.inf  # log-evidence of what describes the record, and that to first order
         self.model = contour_problem(experiment).model
         stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
         of_contour = {name: found[name] for name in self.model.family.parameters}
@@ -269,31 +269,28 @@ class _Tests:
 
     def sought(self, causes: list[_Cause]) -> list[_Cause]:
         """Return causes with their optima: the likeliest to first order first, each from one place, and unless others
-        are likelier; if none describes the record, the likeliest then from all places."""
-        rows: list[_Cause] = []
+        are likelier; then the likeliest from all places if none describes the record, or one far less likely does."""
+        rows: dict[_Cause, _Cause] = {}
         self.deadline = self.deadline or Deadline.after(_SECONDS)  # begins once all has been compiled
         for each in sorted(causes, key=lambda one: -one.log_evidence):
-            found = each
-            if self.deadline.has_passed:
-                self.missed.append(each.name)
-            elif each.log_evidence > min(self.known, self.likely):
-                found = self._sought(each, 1)
-                if found.describes:
-                    self.known = max(self.known, found.log_evidence)
-                    self.likely = max(self.likely, _LIKELY * each.log_evidence)
-            rows.append(found)
-        rows.sort(key=_rank)
-        if np.isneginf(self.known):
-            again = [self._sought(row) for row in rows[:_CLOSELY] if not self.deadline.has_passed]
-            rows = [*(min(pair, key=_rank) for pair in zip(rows, again, strict=False)), *rows[len(again) :]]
-            self.known = max((row.log_evidence for row in rows if row.describes), default=-np.inf)
-        return sorted((row for row in rows if np.isfinite(row.log_evidence)), key=_rank)
+            is_late = self.deadline.has_passed
+            self.missed += [each.name] if is_late else []
+            is_likely = each.log_evidence > min(self.known, _LIKELY * self.likely)
+            rows[each] = self._sought(each, 1) if is_likely and not is_late else each
+        in_vain = [each for each, row in rows.items() if row.sought and not row.describes]
+        for each in sorted(in_vain, key=lambda one: min(_rank(one), _rank(rows[one])))[:_CLOSELY]:
+            is_likelier = self.likely < _LIKELY * each.log_evidence < np.inf
+            if (np.isneginf(self.known) or is_likelier) and not self.deadline.has_passed:
+                rows[each] = min(rows[each], self._sought(each), key=_rank)
+        return sorted((row for row in rows.values() if np.isfinite(row.log_evidence)), key=_rank)
 
     def _sought(self, cause: _Cause, most: int | None = None) -> _Cause:
         """Return a cause with its optimum, from the first so many places or from all; as it is if it has none."""
         with suppress(TactileBayesError):
             found = optimum_beside(cause.model, cause.starts, self.deadline or NEVER, most)
             gain = found.log_evidence - self.own.log_evidence + cause.more
+            if found.fits:
+                self.known, self.likely = max(self.known, gain), max(self.likely, cause.log_evidence)
             return replace(cause, log_evidence=gain, describes=int(found.fits), point=found.point)
         return cause
 

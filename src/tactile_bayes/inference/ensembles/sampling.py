@@ -210,7 +210,7 @@ class _Run:
         if self.progress is not None:
             worst = float(found.r_hat[found.worst_r_hat]), float(found.ess[found.worst_ess])
             self.progress(Progress(self.steps, settings.most_steps, *worst, self.seconds))
-        if self.steps == next_diagnosis(self.steps - 1, settings.block_steps):  # not where a budget ended
+        if not self.ending and self.steps == next_diagnosis(self.steps - 1, settings.block_steps):
             self.state = self.state.recovered()
             if self.steps <= next_diagnosis(_ADAPTED - 1, settings.block_steps):
                 self.state = self.state.adapted()

@@ -36,8 +36,10 @@ _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record'
 _SEARCHES = 3  # for an optimum, if these draws do not lead to a mode, either
 # Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a shape-free
 # contour, which follows what families do not; and the steps that a verdict needs.
-_SMOOTH_FREE, _STEPS_OF_A_VERDICT = 1.4, 50
+_SMOOTH_FREE, _STEPS_OF_A_VERDICT = 1.4, 25
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
+# Ratio of such misfits from which they are alike, and number of these after which other searches would end there, too.
+_ALIKE, _MANY_ALIKE = 1.05, 3
 
 
 class Walk(NamedTuple):
@@ -84,19 +86,20 @@ class _Start(NamedTuple):
 
     def _best_whitening(self) -> Whitening:
         """Return coordinates at the best mode to which the first points lead of which one explains the record."""
-        best: tuple[tuple[bool, float, float], Whitening] | None = None
+        found: list[tuple[tuple[bool, float, float], Whitening]] = []
         for points in self._starting_points():
             for point in points:
-                if best is None or not self.deadline.has_passed:
-                    whitening = whitening_at(self.model, point, self.rng, self.deadline)
-                    misfit, centre = mean_square_left(self.model, whitening.centre), whitening.centre[None]
-                    rank = misfit < _POOR_MISFIT, float(self.model.log_probability(centre)[0]), -misfit
-                    if best is None or rank > best[0]:
-                        best = rank, whitening
-            if best is not None and (best[0][0] or self.deadline.has_passed):
+                whitening = whitening_at(self.model, point, self.rng, self.deadline)
+                misfit, centre = mean_square_left(self.model, whitening.centre), whitening.centre[None]
+                rank = misfit < _POOR_MISFIT, float(self.model.log_probability(centre)[0]), -misfit
+                found.append((rank, whitening))
+                best, whitening = max(found, key=lambda one: one[0])
+                alike = [rank for rank, _ in found if rank[2] > _ALIKE * best[2]]
+                if self.deadline.has_passed or (len(alike) >= _MANY_ALIKE and not best[0]):
+                    return whitening
+            if best[0]:
                 break
-        assert best is not None  # a search has a result, or raises
-        return best[1]
+        return whitening
 
     def _starting_points(self) -> Iterator[Iterable[Floats]]:
         """Yield parameters fitted to Step 2's contacts and the likeliest draws of the prior, or without contacts
