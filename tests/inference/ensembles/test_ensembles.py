@@ -393,3 +393,13 @@ def test_steps_before_a_walker_was_taken_back_are_left_out(step, kept, lost):
     np.testing.assert_array_equal(state.half.samples, samples[:, 20 - kept :])
     assert state.half.moved.shape[1] == kept
     assert np.count_nonzero(state.were_lost()) == lost
+
+
+def test_walkers_that_are_as_improbable_as_their_number_of_parameters_lets_them_be_are_not_lost():
+    """Of 400 places of 50 normal parameters some are ten units below the median; nowhere else is 40 units below."""
+    places = np.random.default_rng(1).normal(size=(4, 1, 100, 50))
+    values = np.repeat(-0.5 * np.square(places).sum(axis=-1), 20, axis=1)
+    assert np.count_nonzero(values[:, 0] < np.median(values) - 10.0) > 2
+    assert not diagnosis.lost_walkers(values).any()
+    values[0, :, 0] = np.median(values) - 40.0
+    assert np.argwhere(diagnosis.lost_walkers(values)).tolist() == [[0, 0]]

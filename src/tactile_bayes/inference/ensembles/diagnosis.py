@@ -12,14 +12,17 @@ from scipy.sparse.csgraph import connected_components
 from tactile_bayes.arrays import Flags, Floats
 
 _TAIL = (0.05, 0.95)  # quantiles that define the effective sample size of the tails
-_LOST_BELOW = 10.0  # distance of a lost walker's largest log-probability below the median of all walkers
+# Distance of a lost walker's largest log-probability below the median of all, at least, and over that of a sixth of
+# their values, which is √(d/2) for normal posteriors of d parameters.
+_LOST_BELOW, _LOST_OVER_SPREAD = 10.0, 6.0
 
 
 def lost_walkers(values: Floats) -> Flags:
     """Return True for walkers, (chain, walker), far less probable than the rest, which R̂ would not detect."""
     if not values.shape[1]:
         return np.zeros((len(values), values.shape[2]), dtype=bool)
-    return np.asarray(values.max(axis=1) < np.median(values) - _LOST_BELOW)
+    low, median = np.quantile(values, [1.0 / 6.0, 0.5])
+    return np.asarray(values.max(axis=1) < median - np.maximum(_LOST_BELOW, _LOST_OVER_SPREAD * (median - low)))
 
 
 _WINDOW = 5.0  # window of the sum of autocorrelations, in autocorrelation times, as in emcee

@@ -69,7 +69,7 @@ class Draws:
 
 # Effective draws per walker, at least, in bulk and tails: the discarded half exceeds as many autocorrelation times.
 _IN_BULK, _IN_TAILS = 5, 3
-_ADAPTED = 50  # steps up to which coordinates are fitted to those kept at each diagnosis
+_ADAPTED = 100  # steps up to which coordinates are fitted to those kept at each diagnosis
 _CONVERGED = "converged"
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
 _OUT_OF_TIME = "not converged, the time allowed ran out"
