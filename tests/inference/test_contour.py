@@ -340,7 +340,7 @@ def test_of_what_is_not_described_no_more_is_sampled_than_a_verdict_needs(family
     real = Rig(load_cell=CELL, unknown={"friction": 0.5})
     record = real.measure(scan(Parabola(**TRUTH), real, drive_step=0.05).record, rng=1)
     result = infer_contour(record, family=family, rig=Rig(load_cell=CELL, unknown="nothing"), rng=1)
-    assert result["sample_stats"].attrs["steps_run"] == 50
+    assert result["sample_stats"].attrs["steps_run"] == 25
     assert result.attrs["converged"] == 0
     assert [one.kind for one in check(result).messages[:1]] == ["not described"]
 

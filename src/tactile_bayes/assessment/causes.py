@@ -81,7 +81,7 @@ def with_bends(model: ContourModel, places: tuple[float, ...]) -> ContourModel:
 COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
 _SECONDS = 45.0  # time limit of all searches [s], each of which takes about one, and shape-free four
 # Share of the log-evidence to first order of what describes the record below which nothing else is sought, and of what
-# does not, above which that is a surprise; and number of the likeliest causes that are then sought from all places.
+# does not, below which that is a surprise; and number of the likeliest causes that are then sought from all places.
 _LIKELY, _CLOSELY = 0.3, 4
 _LEAST = 0.03  # share of the log-evidence of what describes the record, below which a shape is not looked at closely
 # Least share of what any shape explains that one spot explains, to be named in its place; and of the log-evidence of
@@ -156,7 +156,7 @@ def causes_beside(experiment: Experiment, found: Mapping[str, float], deadline: 
     if any(row.is_shape and row.log_evidence >= _least(row) * tests.known for row in rows[:2]):
         rows = [tests.placed(row, spot) if row.is_shape else row for row in rows]
         rows += tests.sought(tests.judged([e for e in every if e.kind == "family" and e.name != _SHAPE_FREE]))
-    better = [f"{row.name} inferred" for row in rows if row.log_evidence > 0.0]
+    better = [f"{row.name} inferred" for row in rows if row.log_evidence > 0.0 or np.isneginf(tests.known)]
     rows += tests.sought(tests.judged(alternatives_by_channel(experiment, better)))
     if misread and not (tests.own.fits or any(row.describes for row in rows)):  # nothing lies below the pivot
         return _of_readings(misread)
