@@ -196,17 +196,21 @@ class _Tests:
     """Tests of what may be wrong with an experiment, beside its most probable parameters by name."""
 
     def __init__(self, experiment: Experiment, found: Mapping[str, float], deadline: Deadline | None) -> None:
-        self.experiment, self.deadline = experiment, deadline
+        self.experiment, self._given = experiment, deadline
         self.missed: list[str] = []  # names of those that were not sought for lack of time
         self.known = self.likely = -np.inf  # log-evidence of what describes the record, and that to first order
         self.model = contour_problem(experiment).model
         stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
         of_contour = {name: found[name] for name in self.model.family.parameters}
-        self.own = optimum_beside(
-            self.model, [found, of_contour], deadline or NEVER
-        )  # a wrong model may have a far-off rig
+        # A wrong model may have a far-off rig.
+        self.own = optimum_beside(self.model, [found, of_contour], deadline or NEVER)
         best = dict(zip(self.model.names, self.own.point.tolist(), strict=True))
         self.starts = [{**stated, **best}, {**stated, **found}, best]  # what is added as stated, and at its median
+
+    @cached_property
+    def deadline(self) -> Deadline:
+        """The deadline as given, or that from the first search on: all has been compiled by then."""
+        return self._given or Deadline.after(_SECONDS)
 
     def judged(self, alternatives: list[Alternative]) -> list[_Cause]:
         """Return alternatives, judged to first order where they add numbers; others have infinite evidence."""
@@ -271,12 +275,12 @@ class _Tests:
         """Return causes with their optima: the likeliest to first order first, each from one place, and unless others
         are likelier; then the likeliest from all places if none describes the record, or one far less likely does."""
         rows: dict[_Cause, _Cause] = {}
-        self.deadline = self.deadline or Deadline.after(_SECONDS)  # begins once all has been compiled
         for each in sorted(causes, key=lambda one: -one.log_evidence):
-            is_late = self.deadline.has_passed
-            self.missed += [each.name] if is_late else []
-            is_likely = each.log_evidence > min(self.known, _LIKELY * self.likely)
-            rows[each] = self._sought(each, 1) if is_likely and not is_late else each
+            rows[each] = each
+            if self.deadline.has_passed:
+                self.missed.append(each.name)
+            elif each.log_evidence > min(self.known, _LIKELY * self.likely):
+                rows[each] = self._sought(each, 1)
         in_vain = [each for each, row in rows.items() if row.sought and not row.describes]
         for each in sorted(in_vain, key=lambda one: min(_rank(one), _rank(rows[one])))[:_CLOSELY]:
             is_likelier = self.likely < _LIKELY * each.log_evidence < np.inf
@@ -287,7 +291,7 @@ class _Tests:
     def _sought(self, cause: _Cause, most: int | None = None) -> _Cause:
         """Return a cause with its optimum, from the first so many places or from all; as it is if it has none."""
         with suppress(TactileBayesError):
-            found = optimum_beside(cause.model, cause.starts, self.deadline or NEVER, most)
+            found = optimum_beside(cause.model, cause.starts, self.deadline, most)
             gain = found.log_evidence - self.own.log_evidence + cause.more
             if found.fits:
                 self.known, self.likely = max(self.known, gain), max(self.likely, cause.log_evidence)

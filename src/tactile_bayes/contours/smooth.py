@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -119,7 +120,7 @@ class Smooth(Tabled):
         there = np.flatnonzero((table[row, 0, 0] <= goal) & (goal <= table[row, -1, 0]))
         row, first, goal = row[there], np.minimum(first[there], cells - 1), goal[there]
         left, right = table[row, first], table[row, first + 1]
-        terms = _polynomial(left[:, ::2], right[:, ::2])
+        terms = np.stack(_polynomial(left[:, ::2], right[:, ::2]))
 
         def short_of(i: Index, t: Floats) -> tuple[Floats, Floats]:
             at, rate = _value_and_rate(terms[:, i], t)
@@ -178,8 +179,8 @@ def _between(left: Floats, right: Floats, t: Floats) -> tuple[Floats, Floats, Fl
     return x, y, x_rate, y_rate
 
 
-def _polynomial(left: Floats, right: Floats) -> Floats:
-    """Coefficients of fifth degree, (6, ...), from value, rate and bend at the ends, (..., 3)."""
+def _polynomial(left: Floats, right: Floats) -> tuple[Floats, ...]:
+    """Six coefficients, (...), from value, rate and bend at the ends, (..., 3)."""
     start, rate, bend = np.moveaxis(left, -1, 0)
     rise = right[..., 0] - start - rate - 0.5 * bend
     rate_rise = right[..., 1] - rate - bend
@@ -187,10 +188,10 @@ def _polynomial(left: Floats, right: Floats) -> Floats:
     c = 10.0 * rise - 4.0 * rate_rise + 0.5 * bend_rise
     d = -15.0 * rise + 7.0 * rate_rise - bend_rise
     e = 6.0 * rise - 3.0 * rate_rise + 0.5 * bend_rise
-    return np.stack([start, rate, 0.5 * bend, c, d, e])
+    return start, rate, 0.5 * bend, c, d, e
 
 
-def _value_and_rate(terms: Floats, t: Floats) -> tuple[Floats, Floats]:
+def _value_and_rate(terms: Iterable[Floats], t: Floats) -> tuple[Floats, Floats]:
     start, rate, half_bend, c, d, e = terms
     value = start + t * (rate + t * (half_bend + t * (c + t * (d + t * e))))
     return value, rate + t * (2.0 * half_bend + t * (3.0 * c + t * (4.0 * d + t * 5.0 * e)))
