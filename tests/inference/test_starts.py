@@ -1,6 +1,7 @@
 """Where searches lead and walkers start, for targets that are known and records that say little."""
 
 from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tactile_bayes import Rig, scan
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.experiment import Experiment, contour_problem
+from tactile_bayes.inference.starts import contour_start
 from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of, smooth_optima
 from tactile_bayes.inference.starts.residuals import mean_square_left
@@ -136,6 +138,21 @@ def test_a_moment_alone_is_enough_for_a_circle():
     assert values["z_1"] == 0.0
     assert values["r"] == pytest.approx(0.3, rel=0.2)
     assert mean_square_left(model, found) < 2.0
+
+
+def test_places_that_touch_nothing_do_not_show_that_nothing_describes_a_record(monkeypatch):
+    """Contours of the same misfit end the search of a shape-free one, but only if they are possible."""
+    misfits, densities = np.array([14.8, 14.7, 14.7, 14.7, 0.9]), np.array([-90.0, -np.inf, -np.inf, -np.inf, 5.0])
+    monkeypatch.setattr(
+        contour_start._Start, "_starting_points", lambda start: ([np.int64(place)] for place in range(5))
+    )
+    monkeypatch.setattr(contour_start, "whitening_at", lambda model, place, *some: SimpleNamespace(centre=place))
+    monkeypatch.setattr(contour_start, "mean_square_left", lambda model, place: misfits[place])
+    model = SimpleNamespace(log_probability=lambda places: densities[places])
+    start = contour_start._Start(model, None, None, None, NEVER)
+    assert start._best_whitening().centre == 4
+    densities[:4] = -90.0
+    assert start._best_whitening().centre in (1, 2, 3)
 
 
 def test_what_a_discrepancy_describes_is_no_misfit():

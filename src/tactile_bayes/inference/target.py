@@ -298,7 +298,7 @@ def result(
         )
     walkers = samples[:, :, None]
     found = Diagnosis(walkers)
-    converged = found.satisfies(settings.max_r_hat, settings.min_ess, settings.min_ess)
+    converged = found.satisfies(settings.max_r_hat, settings.min_ess)
     message = f"{'' if converged else 'not '}converged, draws of {sampler}: {found.message(target.names)}"
     if not converged:
         message += f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -45,6 +46,7 @@ from tactile_bayes.uncertainty.rod_reach import reach
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 _POSTERIOR = "posterior.nc"
+_LONG = 20.0  # time of search and sampling [s] from which their draws are kept before anything else is computed
 _MOST_PARAMETERS = 5  # largest number of parameters in a figure, unless a contour has more
 
 Follow = Callable[[str], object]
@@ -126,7 +128,8 @@ def analyse(
 ) -> ContourRun:
     """Write contact points, contour posterior, band and, if asked for, figures of a record to a folder.
 
-    The posterior is written as soon as it is sampled, in place of a former run, and all other files at the end.
+    The posterior is written once it is sampled, in place of a former run (of a long run before predictions are made,
+    which may be killed), and all other files at the end.
     A part that fails is left out and named. `follow` is called with the name of each part after sampling, as it begins.
     """
     check_probability("probability", probability)
@@ -137,21 +140,28 @@ def analyse(
     if record_file is not None:
         refuse_replacing((Path(out) / name for name in written), [Path(record_file)])
         origin |= file_of(record_file, hashlib.sha256(Path(record_file).read_bytes()).hexdigest())
-    folder, drawn = RunFolder(out), list[xr.DataTree]()
+    folder, drawn, began = RunFolder(out), list[xr.DataTree](), time.monotonic()
+
+    def write() -> None:
+        drawn[-1].attrs |= origin
+        folder.write_posterior(drawn[-1], written)
 
     def keep(posterior: xr.DataTree) -> None:
-        posterior.attrs |= origin
-        folder.write_posterior(posterior, written)
         drawn.append(posterior)
+        if time.monotonic() - began > _LONG:
+            write()
 
     try:
-        keep(infer_contour(measured, rig=rig, rng=rng, keep=keep, **options))
+        drawn.append(infer_contour(measured, rig=rig, rng=rng, keep=keep, **options))
     except Exception as error:
         if not drawn and isinstance(error, InferenceError):
             raise type(error)(" ".join((str(error), *unit_and_sign_findings(measured, rig.load_cell)))) from error
         if not drawn:
             raise
         folder.left_out["predictions"] = error
+    finally:
+        if drawn:
+            write()
     return complete(folder, measured, rig, drawn[-1], probability, truth, figures, follow)
 
 

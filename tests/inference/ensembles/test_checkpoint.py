@@ -171,25 +171,25 @@ def test_a_run_out_of_time_goes_on_with_the_same_time_again(tmp_path):
 
 
 def test_a_run_that_ended_between_two_looks_is_judged_there_again(tmp_path):
-    """Of the plan 80, 100, 125 no look is at 101, and a run that was killed there goes on to the next."""
+    """Of the plan 79, 99, 124 no look is at 100, and a run that was killed there goes on to the next."""
     strict, loose = replace(STEADY, min_ess=1e9), replace(STEADY, min_ess=1.0, max_r_hat=10.0)
-    draw(tmp_path, settings=replace(strict, max_steps=100))
-    assert draw(tmp_path, settings=replace(strict, max_seconds=1e-9)).steps_run == 101
+    draw(tmp_path, settings=replace(strict, max_steps=99))
+    assert draw(tmp_path, settings=replace(strict, max_seconds=1e-9)).steps_run == 100
     target = Counted()
     first = draw(tmp_path, settings=loose, target=target)
-    assert (first.converged, first.steps_run, target.calls) == (True, 101, 0)
+    assert (first.converged, first.steps_run, target.calls) == (True, 100, 0)
     stated(tmp_path, is_end=False)
-    assert draw(tmp_path, settings=loose).steps_run == 125
+    assert draw(tmp_path, settings=loose).steps_run == 124
 
 
 def test_an_interrupt_keeps_the_whole_blocks_and_gives_what_is_there(tmp_path):
     draws = draw(tmp_path, target=Counted(killed_at=2 + 2 * 24, error=KeyboardInterrupt))
     assert "interrupted" in draws.message
-    assert 20 < draws.steps_run < 30
-    assert steps_in(tmp_path) == 20
+    assert 22 < draws.steps_run < 28
+    assert steps_in(tmp_path) == 22
     draws = draw(tmp_path, target=Counted(killed_at=1, error=KeyboardInterrupt))
     assert "interrupted" in draws.message
-    np.testing.assert_array_equal(draws.samples, draw(settings=replace(SMALL, max_steps=20)).samples)
+    np.testing.assert_array_equal(draws.samples, draw(settings=replace(SMALL, max_steps=22)).samples)
     assert_same(draw(tmp_path), whole())
 
 

@@ -45,8 +45,8 @@ class Diagnosis:
         self.worst_r_hat = int(np.argmax(np.where(np.isnan(self.r_hat), np.inf, self.r_hat)))  # number of a parameter
         self.worst_ess = int(np.argmin(np.nan_to_num(self.ess)))
 
-    def satisfies(self, max_r_hat: float, bulk: float, tails: float) -> bool:
-        return bool(np.all(self.r_hat < max_r_hat) and np.all(self.ess_bulk >= bulk) and np.all(self.ess_tail >= tails))
+    def satisfies(self, max_r_hat: float, ess: float) -> bool:
+        return bool(np.all(self.r_hat < max_r_hat) and np.all(self.ess >= ess))
 
     def message(self, names: Sequence[str]) -> str:
         i, j = self.worst_r_hat, self.worst_ess

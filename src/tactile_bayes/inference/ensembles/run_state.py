@@ -55,7 +55,7 @@ def next_diagnosis(steps: int, block_steps: int) -> int:
     """Return the number of steps at which a run that has made `steps` is diagnosed next."""
     due = block_steps
     while due <= steps:
-        due += max(block_steps, math.ceil((_GROWTH - 1.0) * due))
+        due += math.ceil((_GROWTH - 1.0) * due)
     return due
 
 

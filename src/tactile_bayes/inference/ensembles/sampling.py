@@ -67,8 +67,7 @@ class Draws:
         return evenly_spread(self.samples.shape[1], most)
 
 
-# Effective draws per walker, at least, in bulk and tails: the discarded half exceeds as many autocorrelation times.
-_IN_BULK, _IN_TAILS = 5, 3
+_PER_WALKER = 3  # effective draws, at least: the half that is left out exceeds as many autocorrelation times
 _ADAPTED = 100  # steps up to which coordinates are fitted to those kept at each diagnosis
 _CONVERGED = "converged"
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
@@ -104,8 +103,8 @@ def sample(
     `start`, (ensembles, walkers, parameters), in the coordinates, should be wider than the posterior, or R̂ cannot
     distinguish a part of it from the whole. The second half of the steps, or those since a lost walker was taken back,
     is diagnosed after `block_steps`, and whenever their number has grown by a quarter (Vehtari et al. 2021, doi
-    10.1214/20-BA1221): the run stops when settings are satisfied, with five effective draws per walker on average,
-    three in the tails, and no walker lost. A KeyboardInterrupt after the first step ends it. With a checkpoint a run
+    10.1214/20-BA1221): the run stops when settings are satisfied, with three effective draws per walker on average, and
+    no walker lost. A KeyboardInterrupt after the first step ends it. With a checkpoint a run
     resumes, bit by bit; `identity` states what determines the log-probability.
     """
     began = time.monotonic()
@@ -155,10 +154,9 @@ class _Run:
         return self.state.steps
 
     @property
-    def least(self) -> tuple[float, float]:
-        """Effective sample sizes that are enough, in bulk and tails."""
-        walkers = self.state.last.log_probability[:, 0].size
-        return max(self.settings.min_ess, _IN_BULK * walkers), max(self.settings.min_ess, _IN_TAILS * walkers)
+    def enough(self) -> float:
+        """Effective sample size that is enough."""
+        return max(self.settings.min_ess, _PER_WALKER * self.state.last.log_probability[:, 0].size)
 
     @property
     def seconds(self) -> float:
@@ -202,9 +200,9 @@ class _Run:
         self.state = self.state.halved()
         self.diagnosis = found = Diagnosis(self.state.half.samples)
         if not self.ending:
-            enough = found.satisfies(settings.max_r_hat, *self.least)
+            satisfied = found.satisfies(settings.max_r_hat, self.enough)
             spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.most_steps else ""
-            self.ending = _CONVERGED if enough and not np.any(self.state.were_lost()) else spent
+            self.ending = _CONVERGED if satisfied and not np.any(self.state.were_lost()) else spent
         if self.stored is not None and self.ending not in ("", _INTERRUPTED):
             self.stored.write(self.state, self.seconds, is_end=True)
         if self.progress is not None:
@@ -212,7 +210,7 @@ class _Run:
             self.progress(Progress(self.steps, settings.most_steps, *worst, self.seconds))
         if not self.ending and self.steps == next_diagnosis(self.steps - 1, settings.block_steps):
             self.state = self.state.recovered()
-            if self.steps <= next_diagnosis(_ADAPTED - 1, settings.block_steps):
+            if self.steps <= max(_ADAPTED, settings.block_steps):
                 self.state = self.state.adapted()
         self.due = next_diagnosis(self.steps, settings.block_steps)
 
@@ -228,9 +226,7 @@ class _Run:
         modes = () if converged else modes_of(half.samples, half.values, names)
         message = f"{self.ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {found.message(names)}"
         if not converged:
-            bulk, tails = self.least
-            criteria = f"R̂ below {settings.max_r_hat:g} and an effective sample size of {bulk:.0f} in the bulk"
-            message += f"; criteria: {criteria} and {tails:.0f} in the tails"
+            message += f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {self.enough:.0f}"
         if modes:
             message += f"; {modes_message(modes)}"
         of_walkers = f"of {chains * walkers} walkers"

@@ -26,15 +26,15 @@ class SamplerSettings:
         depend on it, and more of them are faster, but each has to forget its start. A shape-free contour, whose
         coordinates are nearly normal, has twice the number of parameters.
     block_steps : int
-        Number of steps before the first diagnosis, and the smallest number between later ones, which come when the
-        steps have grown by a quarter.
+        Number of steps before the first diagnosis, and at most between writes of a checkpoint. Later diagnoses come
+        when the steps have grown by a quarter.
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
-        Every parameter's effective sample size, in the bulk and in the tails, must reach this, and five for every
-        walker, three in the tails: fewer would mean that walkers have not forgotten their starting points.
+        Every parameter's effective sample size, in the bulk and in the tails, must reach this, and three for every
+        walker: fewer would mean that walkers have not forgotten their starting points.
     max_steps : int, optional
-        Number of steps after which each ensemble stops, converged or not. By default 20,000, and 50, as many as a
+        Number of steps after which each ensemble stops, converged or not. By default 20,000, and 25, as many as a
         verdict needs, where the best parameters of a contour leave what no noise explains.
     max_seconds : float, optional
         Time limit of a posterior [s], counted from the call: the search for a start ends with its present step, and so

@@ -33,7 +33,7 @@ _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
 _CENTRAL = ndtr(np.array([-1.0, 1.0]))  # probabilities whose quantiles are two standard deviations apart
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
-_SEARCHES = 3  # for an optimum, if these draws do not lead to a mode, either
+_SEARCHES = 1  # for an optimum, if these draws do not lead to a mode, either
 # Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a shape-free
 # contour, which follows what families do not; and the steps that a verdict needs.
 _SMOOTH_FREE, _STEPS_OF_A_VERDICT = 1.4, 25
@@ -94,7 +94,8 @@ class _Start(NamedTuple):
                 rank = misfit < _POOR_MISFIT, float(self.model.log_probability(centre)[0]), -misfit
                 found.append((rank, whitening))
                 best, whitening = max(found, key=lambda one: one[0])
-                alike = [rank for rank, _ in found if rank[2] > _ALIKE * best[2]]
+                possible = [-rank[2] for rank, _ in found if np.isfinite(rank[1])]  # others may touch nothing
+                alike = [misfit for misfit in possible if misfit < _ALIKE * min(possible)]
                 if self.deadline.has_passed or (len(alike) >= _MANY_ALIKE and not best[0]):
                     return whitening
             if best[0]:
@@ -108,7 +109,7 @@ class _Start(NamedTuple):
         by_contacts = contact_fit(model)
         if by_contacts is None:
             yield smooth_optima(model, rng, deadline)
-            yield [optimum_of(model, rng, deadline).point]
+            yield [optimum_of(model, rng, deadline, _SEARCHES).point]
             return
         of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
         of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
