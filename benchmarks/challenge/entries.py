@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -26,7 +27,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.assessment.split_prediction import Linearisation
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.starts.contour_optimum import optimum_of
+from tactile_bayes.inference.starts.contour_optimum import optima_of
 from tactile_bayes.tasks import one_thread, write_atomically
 
 FARTHEST = 120  # number of the last grid point on either side
@@ -46,7 +47,12 @@ def laplace(record: xr.Dataset, rig: tb.Rig, family: str, x: Floats) -> Answer:
     """Draw from the normal distribution about the best fit, of logarithms where parameters are positive."""
     model = Experiment(record, rig, family).model
     rng = np.random.default_rng(SEED)
-    best, positive = optimum_of(model, rng), model.coordinates.positive
+    tried = []
+    for one in islice(optima_of(model, rng), 9):
+        tried.append(one)
+        if one.fits:
+            break
+    best, positive = min(tried, key=lambda one: one.cost), model.coordinates.positive
     scales = np.sqrt(np.diag(best.covariance)) * np.where(positive, best.point, 1.0)
     (fit,) = Linearisation(model, scales).fits(model.likelihood.measured[None], best.point[None])
     if fit is None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -48,7 +48,6 @@ _MAX_RELATIVE_SD = 2.0  # of a contact normal to the contour, over the median on
 _MIN_GAIN, _MAX_COST = 100.0, 5.0
 _DISCREPANCY_SPREAD = 0.4  # deviation of the logs of its scale and length, before they are known
 _MAX_RESIDUAL = 100.0  # largest residual in standard deviations from which a discrepancy is estimated
-_MAX_TRIED = 9  # number of searches after which the best optimum is taken though it does not explain the record
 # Ratio of the cost to the least one below which optima are alike, and number of such from which others will be, too.
 _ALIKE, _MANY_ALIKE = 1.25, 3
 _MAX_COST_RATIO = 0.9  # share of the cost that a search from Step 2's contacts may leave to be taken
@@ -106,24 +105,9 @@ def event_brackets(model: ContourModel) -> Brackets:
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
 
 
-def optimum_of(
-    model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER, most: int = _MAX_TRIED
-) -> ContourOptimum:
-    """Return the first optimum of `optima_of` that explains the record, or else the best of the first ones."""
-    tried: list[ContourOptimum] = []
-    for found in optima_of(model, rng, deadline):
-        tried.append(found)
-        if found.fits or len(tried) == most or are_alike(tried):
-            break
-    if not tried:
-        raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
-    return min(tried, key=lambda one: one.cost)
-
-
-def are_alike(optima: Sequence[ContourOptimum | Optimum]) -> bool:
-    """Return True if so many of the optima have nearly the least cost that further searches would end there, too."""
-    costs = np.array([one.cost for one in optima])
-    return bool(costs.size and np.count_nonzero(costs < _ALIKE * costs.min()) >= _MANY_ALIKE)
+def are_alike(costs: Sequence[float], ratio: float = _ALIKE) -> bool:
+    """Return True if so many optima have nearly the least cost that further searches would end there, too."""
+    return sum(cost < ratio * min(costs) for cost in costs) >= _MANY_ALIKE
 
 
 def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
@@ -142,7 +126,7 @@ def optimum_beside(
     tried: list[Optimum] = []
     for found in optima(search.residuals, islice(search.beside(starts), most), *search.limits):
         tried.append(found)
-        if found.fits or are_alike(tried):
+        if found.fits or are_alike([one.cost for one in tried]):
             break
     best = min(tried, key=lambda one: one.cost)
     return search.complete(search.refine(best) if most is None else best)

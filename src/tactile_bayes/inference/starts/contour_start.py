@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,13 @@ from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.observations import Observer, scale_names, white_scales
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening, whitening_at
 from tactile_bayes.inference.starts.cloud import gather
-from tactile_bayes.inference.starts.contour_optimum import contact_fit, fitted_noise, optimum_of, smooth_optima
+from tactile_bayes.inference.starts.contour_optimum import (
+    are_alike,
+    contact_fit,
+    fitted_noise,
+    optima_of,
+    smooth_optima,
+)
 from tactile_bayes.inference.starts.modes import Modes
 from tactile_bayes.inference.starts.residuals import left_over_noise, mean_square_left
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
@@ -33,13 +40,11 @@ _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
 _CENTRAL = ndtr(np.array([-1.0, 1.0]))  # probabilities whose quantiles are two standard deviations apart
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
-_SEARCHES = 1  # for an optimum, if these draws do not lead to a mode, either
 # Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a shape-free
 # contour, which follows what families do not; and the steps that a verdict needs.
 _SMOOTH_FREE, _STEPS_OF_A_VERDICT = 1.4, 25
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
-# Ratio of such misfits from which they are alike, and number of these after which other searches would end there, too.
-_ALIKE, _MANY_ALIKE = 1.05, 3
+_ALIKE = 1.05  # ratio of such misfits below which they are alike
 
 
 class Walk(NamedTuple):
@@ -95,8 +100,7 @@ class _Start(NamedTuple):
                 found.append((rank, whitening))
                 best, whitening = max(found, key=lambda one: one[0])
                 possible = [-rank[2] for rank, _ in found if np.isfinite(rank[1])]  # others may touch nothing
-                alike = [misfit for misfit in possible if misfit < _ALIKE * min(possible)]
-                if self.deadline.has_passed or (len(alike) >= _MANY_ALIKE and not best[0]):
+                if self.deadline.has_passed or (are_alike(possible, _ALIKE) and not best[0]):
                     return whitening
             if best[0]:
                 break
@@ -109,14 +113,13 @@ class _Start(NamedTuple):
         by_contacts = contact_fit(model)
         if by_contacts is None:
             yield smooth_optima(model, rng, deadline)
-            yield [optimum_of(model, rng, deadline, _SEARCHES).point]
-            return
-        of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
-        of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
-        yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
-        drawn, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
-        yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
-        yield [optimum_of(model, rng, deadline, _SEARCHES).point]
+        else:
+            of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
+            of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
+            yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
+            drawn, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
+            yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
+        yield (one.point for one in islice(optima_of(model, rng, deadline), 1))
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
         """Return the start around a centre, in whitening coordinates."""

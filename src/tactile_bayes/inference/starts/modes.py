@@ -99,7 +99,7 @@ class Modes:
     def _are_all(self, others: list[ContourOptimum], repeats: int, tried: int, many_samples: bool) -> bool:
         """Return True if no further search is worth while, after so many, of which so many ended in known modes."""
         normal = bool(self.found) and self.found[-1].proposal.efficiency > EFFICIENT
-        hopeless = not self.found and are_alike(others)
+        hopeless = not self.found and are_alike([one.cost for one in others])
         if many_samples and (normal or hopeless or repeats == _REPEATS):
             return True
         if normal and repeats == _REPEATS_FEW_SAMPLES:
