@@ -16,6 +16,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.assessment.assumptions import Alternative, alternatives_by_channel, alternatives_of, stated_cell
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.family import ContourFamily, FamilyParameter
+from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.diagnostics.findings import Finding, quantity
 from tactile_bayes.diagnostics.inspection.inspection import inspect_record
 from tactile_bayes.errors import TactileBayesError
@@ -203,7 +204,7 @@ class _Tests:
         stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
         of_contour = {name: found[name] for name in self.model.family.parameters}
         # A wrong model may have a far-off rig; a shape-free contour, which follows most, is where the search left it.
-        most = 1 if experiment.own_family.name == _SHAPE_FREE.removeprefix("family ") else None
+        most = 1 if isinstance(self.model.family, ShapeFreeFamily) else None
         self.own = optimum_beside(self.model, [found, of_contour], deadline or NEVER, most)
         best = dict(zip(self.model.names, self.own.point.tolist(), strict=True))
         self.starts = [{**stated, **best}, {**stated, **found}, best]  # what is added as stated, and at its median

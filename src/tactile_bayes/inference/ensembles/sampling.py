@@ -104,8 +104,8 @@ def sample(
     distinguish a part of it from the whole. The second half of the steps, or those since a lost walker was taken back,
     is diagnosed after `block_steps`, and whenever their number has grown by a quarter (Vehtari et al. 2021, doi
     10.1214/20-BA1221): the run stops when settings are satisfied, with three effective draws per walker on average, and
-    no walker lost. A KeyboardInterrupt after the first step ends it. With a checkpoint a run
-    resumes, bit by bit; `identity` states what determines the log-probability.
+    no walker lost. A KeyboardInterrupt after the first step ends it. With a checkpoint a run resumes, bit by bit;
+    `identity` states what determines the log-probability.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
