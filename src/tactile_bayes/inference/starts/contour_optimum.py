@@ -38,7 +38,7 @@ _STEP_OF_ADDED = 0.2  # of the differences by a parameter that is added, in prio
 _FARTHEST = 2.0  # longest step to first order, in prior standard deviations of a parameter
 _SHARES = np.array([1.0, 0.5, 0.25, 0.1, 0.0])  # of that step, of which the best is taken
 _CANDIDATES = 24  # most prior draws from which searches begin, the likeliest first: from too far away they stop early
-_SMOOTH_STARTS = 6  # of these from which contours without roughness are sought
+_SMOOTH_DRAWS, _SMOOTH_STARTS = 300, 6  # of the prior, and of the likeliest of them, for contours without roughness
 _EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
 _MAX_LOG_DISTANCE = 12.0  # of the log of a parameter from its prior median in a search, in prior spreads
 _DECAY = 5.0  # lags after which a load that has ended is a hundredth of itself
@@ -227,9 +227,9 @@ class _Search:
             points[:, self.model.names.index(name)] = zero
         return points
 
-    def drawn(self, rng: np.random.Generator) -> Floats:
-        """Return coordinates of draws from the prior within reach, (n, parameters)."""
-        points, _ = self.model.draw_prior(rng, _PRIOR_DRAWS, self.deadline)
+    def drawn(self, rng: np.random.Generator, count: int) -> Floats:
+        """Return coordinates of draws from the prior within reach, (count, parameters) or fewer."""
+        points, _ = self.model.draw_prior(rng, count, self.deadline)
         return self.coordinates.of(self._with_zeros(points)[:, : self.middle.size])
 
     def points(self, coordinates: Floats) -> Floats:
@@ -284,7 +284,8 @@ class _Search:
         fitted = self._at_contacts()
         if fitted is not None:
             yield fitted
-        yield from islice(self._likeliest(self.residuals, self.drawn(rng), self.middle, self.spread), _CANDIDATES)
+        drawn = self.drawn(rng, _PRIOR_DRAWS)
+        yield from islice(self._likeliest(self.residuals, drawn, self.middle, self.spread), _CANDIDATES)
 
     def _likeliest(self, residuals: Residuals, drawn: Floats, middle: Floats, spread: Floats) -> Iterator[Floats]:
         """Yield drawn coordinates, the likeliest first, each moved until events are in their brackets."""
@@ -318,7 +319,7 @@ class _Search:
 
         middle, spread, low, high = (limit[free] for limit in self.limits[:4])
         covariance = np.diag(np.square(self.spread))
-        drawn = self.drawn(rng)
+        drawn = self.drawn(rng, _SMOOTH_DRAWS)
         flank = np.sign(drawn[:, names.index("flat_slope")]) if "flat_slope" in names else np.ones(len(drawn))
         for side in (sides := np.unique(flank)):
             here = drawn[flank == side][:, free]
