@@ -148,6 +148,13 @@ def test_stuck_walkers_are_reported():
     assert np.all(np.isinf(draws.autocorrelation_time))
 
 
+def test_walkers_that_few_steps_leave_where_they_were_are_not_called_stuck():
+    settings = SamplerSettings(ensembles=2, walkers=64, block_steps=4, max_steps=4)
+    draws = draw_from(standard, 2, settings=settings)
+    assert draws.stuck > 10
+    assert "did not move" not in draws.message
+
+
 @pytest.mark.parametrize("calls", [10, 60])
 def test_an_interrupt_leaves_what_has_been_drawn(calls):
     """The draws are those of a run that was planned to end after as many steps."""

@@ -222,6 +222,8 @@ class _Run:
         converged, half = self.ending == _CONVERGED, state.half
         moved = half.moved[:, 1:]  # not in the first step of those kept, before which nothing is known
         stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
+        acceptance = moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan)
+        by_chance = chains * walkers * (1.0 - acceptance.mean()) ** moved.shape[1]
         lost = int(np.count_nonzero(state.were_lost()))
         modes = () if converged else modes_of(half.samples, half.values, names)
         message = f"{self.ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {found.message(names)}"
@@ -232,7 +234,7 @@ class _Run:
         of_walkers = f"of {chains * walkers} walkers"
         if lost:
             message += f"; {lost} {of_walkers} were where the posterior is improbable: do not use the results"
-        if stuck:
+        if stuck > by_chance + 3.0 * np.sqrt(by_chance):
             message += f"; {stuck} {of_walkers} did not move in the steps kept: look at their positions"
         return Draws(
             samples=walker_major(half.samples),
@@ -245,7 +247,7 @@ class _Run:
             r_hat=found.r_hat,
             ess_bulk=found.ess_bulk,
             ess_tail=found.ess_tail,
-            acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
+            acceptance=acceptance,
             autocorrelation_time=state.every * autocorrelation_time(half.samples),
             evaluations=self.target.evaluations,
             seconds=self.seconds,
