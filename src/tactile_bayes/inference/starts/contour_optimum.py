@@ -112,8 +112,8 @@ def are_alike(costs: Sequence[float], ratio: float = _ALIKE) -> bool:
 
 def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
     """Yield optima that start from a contour fitted to Step 2's contacts, and from prior draws, the likeliest first."""
-    search = _Search(model, deadline)
-    for found in optima(search.residuals, search.starts(rng), *search.limits):
+    search = _Search(model, model.draw_prior(rng, _PRIOR_DRAWS, deadline)[0], deadline)
+    for found in optima(search.residuals, search.starts(), *search.limits):
         yield search.complete(search.refine(found))
 
 
@@ -122,7 +122,7 @@ def optimum_beside(
 ) -> ContourOptimum:
     """Return the best of the optima from starts by name, for a contour of its family, and from Step 2's contacts; with
     a number, of the first so many that there are."""
-    search = _Search(model, deadline)
+    search = _Search(model, _prior_quantiles(model), deadline)
     tried: list[Optimum] = []
     for found in optima(search.residuals, islice(search.beside(starts), most), *search.limits):
         tried.append(found)
@@ -134,13 +134,13 @@ def optimum_beside(
 
 def smooth_optima(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> list[Floats]:
     """Return the parameters of the best contours without roughness: a circle, or one with a flat side on each flank."""
-    search = _Search(model, deadline)
-    return [search.complete(found).point for found in search.smooth(rng)]
+    search = _Search(model, model.draw_prior(rng, _SMOOTH_DRAWS, deadline)[0], deadline)
+    return [search.complete(found).point for found in search.smooth()]
 
 
 def cost_of_residuals(model: ContourModel, start: Mapping[str, float]) -> float:
     """Return the robust cost of a record's residuals at parameters by name."""
-    search = _Search(model, NEVER)
+    search = _Search(model, _prior_quantiles(model), NEVER)
     coordinates = search.coordinates.of(search.named(start)[None])
     return float(robust_cost(search.residuals(coordinates))[0])
 
@@ -156,7 +156,7 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
     """Return what each group of added parameters explains beside a start, the optimum of the model without them. It is
     ½ (sᵀ S⁻¹ s − log det S), Laplace's approximation, of the score s of a group and its information S, less what the
     others explain, both in prior standard deviations (Rao's score test, and its price)."""
-    search, names = _Search(model, NEVER), model.forward_parameters
+    search, names = _Search(model, _prior_quantiles(model), NEVER), model.forward_parameters
     place = search.coordinates.of(search.named(start)[None])[0] / search.spread
     residuals, loose = search.residuals((place * search.spread)[None])[0], set().union(*added)
 
@@ -195,10 +195,16 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
     return found
 
 
+def _prior_quantiles(model: ContourModel) -> Floats:
+    """Return quantiles of the priors, each parameter's by itself, in place of draws, (quantiles, d)."""
+    shares = np.linspace(0.02, 0.98, _PRIOR_QUANTILES)
+    return model.prior_quantiles(np.tile(shares[:, None], len(model.names)))
+
+
 class _Search:
     """Least squares over the forward-model parameters, positive ones by their logarithms; noise from residuals."""
 
-    def __init__(self, model: ContourModel, deadline: Deadline) -> None:
+    def __init__(self, model: ContourModel, candidates: Floats, deadline: Deadline) -> None:
         self.model = model
         self.deadline = deadline
         size = len(model.forward_parameters)
@@ -210,27 +216,18 @@ class _Search:
         self.bias = bias / np.where(size_of_bias > 0.0, size_of_bias, 1.0)
         self.of_bias = 1.0 - 1.0 / np.hypot(1.0, size_of_bias)
         self.brackets = event_brackets(model)
-        shares = np.linspace(0.02, 0.98, _PRIOR_QUANTILES)
-        self.prior = self._with_zeros(model.prior_quantiles(np.tile(shares[:, None], len(model.names))))
-        self.usual = np.median(self.prior[:, :size], axis=0)
-        percentiles = np.quantile(self.coordinates.of(self.prior[:, :size]), [0.16, 0.84], axis=0)
+        self.candidates = candidates.copy()
+        for name, zero in _zeros(model).items():
+            self.candidates[:, model.names.index(name)] = zero
+        self.usual = np.median(self.candidates[:, :size], axis=0)
+        self.drawn = self.coordinates.of(self.candidates[:, :size])
+        percentiles = np.quantile(self.drawn, [0.16, 0.84], axis=0)
         coarse = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
         stated = np.array([float(model.priors[name].std()) for name in model.forward_parameters])
         self.middle = percentiles.mean(axis=0)
         self.spread = np.where(np.isfinite(stated) & ~self.coordinates.positive, stated, coarse)
         ends = model.walked_ends
         self.limits = self.middle, self.spread, ends.low[:size], ends.high[:size], deadline
-
-    def _with_zeros(self, points: Floats) -> Floats:
-        """Return points, (n, d), with the zeros that the unloaded samples show."""
-        for name, zero in _zeros(self.model).items():
-            points[:, self.model.names.index(name)] = zero
-        return points
-
-    def drawn(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return coordinates of draws from the prior within reach, (count, parameters) or fewer."""
-        points, _ = self.model.draw_prior(rng, count, self.deadline)
-        return self.coordinates.of(self._with_zeros(points)[:, : self.middle.size])
 
     def points(self, coordinates: Floats) -> Floats:
         """Return the forward-model parameters at coordinates, both of shape (n, parameters)."""
@@ -279,13 +276,12 @@ class _Search:
         if not (of_contour or contacts):
             yield from (self.coordinates.of(self.named(start)) for start in starts)
 
-    def starts(self, rng: np.random.Generator) -> Iterator[Floats]:
+    def starts(self) -> Iterator[Floats]:
         """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""
         fitted = self._at_contacts()
         if fitted is not None:
             yield fitted
-        drawn = self.drawn(rng, _PRIOR_DRAWS)
-        yield from islice(self._likeliest(self.residuals, drawn, self.middle, self.spread), _CANDIDATES)
+        yield from islice(self._likeliest(self.residuals, self.drawn, self.middle, self.spread), _CANDIDATES)
 
     def _likeliest(self, residuals: Residuals, drawn: Floats, middle: Floats, spread: Floats) -> Iterator[Floats]:
         """Yield drawn coordinates, the likeliest first, each moved until events are in their brackets."""
@@ -301,7 +297,7 @@ class _Search:
             else:
                 yield place
 
-    def smooth(self, rng: np.random.Generator) -> Iterator[Optimum]:
+    def smooth(self) -> Iterator[Optimum]:
         """Yield the best contours without roughness, as the loads have them with the usual rig, for each flank on which
         a flat side may be."""
         family, names = self.model.family, self.model.forward_parameters
@@ -319,11 +315,10 @@ class _Search:
 
         middle, spread, low, high = (limit[free] for limit in self.limits[:4])
         covariance = np.diag(np.square(self.spread))
-        drawn = self.drawn(rng, _SMOOTH_DRAWS)
-        flank = np.sign(drawn[:, names.index("flat_slope")]) if "flat_slope" in names else np.ones(len(drawn))
+        flank = np.sign(self.drawn[:, names.index("flat_slope")]) if "flat_slope" in names else np.ones(len(self.drawn))
         for side in (sides := np.unique(flank)):
-            here = drawn[flank == side][:, free]
-            places = islice(self._likeliest(residuals, here, middle, spread), _SMOOTH_STARTS // len(sides))
+            drawn = self.drawn[flank == side]
+            places = islice(self._likeliest(residuals, drawn[:, free], middle, spread), _SMOOTH_STARTS // len(sides))
             found = optima(residuals, places, middle, spread, low, high, self.deadline)
             best = min(found, key=lambda one: one.cost)
             yield Optimum(whole(best.point[None])[0], covariance, best.residuals, best.cost)
@@ -355,10 +350,10 @@ class _Search:
         model, size = self.model, self.middle.size
         point = self.points(found.point[None])[0]
         residuals = found.residuals[: self.measured.size].reshape(self.measured.shape)
-        drawn = self.prior[:, len(model.names) - len(model.noise.of_discrepancy) :]
+        drawn = self.candidates[:, len(model.names) - len(model.noise.of_discrepancy) :]
         noise = np.append(fitted_noise(model, residuals), _fitted_discrepancy(model, point, residuals, drawn))
         if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
-            possible = self.prior[:, size:]
+            possible = self.candidates[:, size:]
             noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
         narrow = np.minimum(0.5 * self.spread / np.sqrt(np.diag(found.covariance)), 1.0)
         variances = np.full(len(model.names), 0.5 / self.measured.size)
@@ -407,7 +402,7 @@ def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
 
 
 def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, drawn: Floats) -> Floats:
-    """Return the discrepancy that fits residuals as in `fitted_noise`, from prior quantiles (n, 2); else empty."""
+    """Return the discrepancy that fits residuals as in `fitted_noise`, from prior draws (n, 2); empty without one."""
     if not model.noise.of_discrepancy:
         return np.empty(0)
     largest = model.largest_in_contact(point)[:, model.present]
