@@ -1,5 +1,6 @@
 """Where searches lead and walkers start, for targets that are known and records that say little."""
 
+from dataclasses import replace
 from itertools import islice
 from types import SimpleNamespace
 
@@ -9,6 +10,8 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL
 from tactile_bayes import Rig, scan
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.experiment import Experiment, contour_problem
@@ -16,6 +19,7 @@ from tactile_bayes.inference.starts import contour_start
 from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of, smooth_optima
 from tactile_bayes.inference.starts.residuals import mean_square_left
+from tactile_bayes.numerics.random_numbers import child, spawn
 from tactile_bayes.rig import NOTHING
 
 PASSED = Deadline.after(0.0)
@@ -140,19 +144,53 @@ def test_a_moment_alone_is_enough_for_a_circle():
     assert mean_square_left(model, found) < 2.0
 
 
-def test_places_that_touch_nothing_do_not_show_that_nothing_describes_a_record(monkeypatch):
-    """Contours of the same misfit end the search of a shape-free one, but only if they are possible."""
-    misfits, densities = np.array([14.8, 14.7, 14.7, 14.7, 0.9]), np.array([-90.0, -np.inf, -np.inf, -np.inf, 5.0])
-    monkeypatch.setattr(
-        contour_start._Start, "_starting_points", lambda start: ([np.int64(place)] for place in range(5))
-    )
-    monkeypatch.setattr(contour_start, "whitening_at", lambda model, place, *some: SimpleNamespace(centre=place))
-    monkeypatch.setattr(contour_start, "mean_square_left", lambda model, place: misfits[place])
-    model = SimpleNamespace(log_probability=lambda places: densities[places])
-    start = contour_start._Start(model, None, None, None, NEVER)
-    assert start._best_whitening().centre == 4
-    densities[:4] = -90.0
-    assert start._best_whitening().centre in (1, 2, 3)
+@pytest.fixture
+def search(monkeypatch):
+    """The search of a shape-free contour among places of given misfits and log-probabilities, one a stage."""
+
+    def found(misfits, densities, *, hopeless=()):
+        places = map(np.int64, range(len(misfits)))
+        monkeypatch.setattr(contour_start._Start, "_starting_points", lambda start: ([place] for place in places))
+        monkeypatch.setattr(contour_start._Start, "_top_near", lambda start, one: densities[one.centre])
+        monkeypatch.setattr(contour_start._Start, "_is_hopeless", lambda start, one: one.centre in hopeless)
+        monkeypatch.setattr(contour_start, "whitening_at", lambda model, place, *some: SimpleNamespace(centre=place))
+        monkeypatch.setattr(contour_start, "mean_square_left", lambda model, place: misfits[place])
+        best = contour_start._Start(SimpleNamespace(), None, None, None, NEVER)._best_whitening().centre
+        return int(best), next(places, len(misfits))
+
+    return found
+
+
+def test_searches_end_where_a_contour_explains_the_record(search):
+    assert search([14.8, 0.9, 0.8], [-90.0, 5.0, 9.0]) == (1, 2)
+    assert search([0.8, 0.9, 0.9], [-np.inf, 5.0, 9.0]) == (1, 2), "what nothing near makes possible explains nothing"
+    assert search([1.8, 0.9, 0.9], [4.0, 5.0, 9.0], hopeless=[0]) == (1, 2)
+
+
+def test_searches_end_where_they_end_alike_again_and_again(search):
+    """As from the contacts and prior draws, after which a search of another kind has to end there, too."""
+    alike, worse = [14.8, 14.7, 14.7], [-90.0, -91.0, -92.0]
+    assert search([*alike, 14.7, 0.9], [*worse, -93.0, 5.0]) == (0, 4)
+    assert search([*alike, 0.9, 0.9], [*worse, 5.0, 5.0]) == (3, 4)
+
+
+def test_places_that_touch_nothing_do_not_show_that_nothing_describes_a_record(search):
+    misfits, impossible = [14.8, 14.7, 14.7, 14.7, 14.7, 0.9], [-90.0, *4 * [-np.inf], 5.0]
+    assert search(misfits, impossible) == (5, 6)
+    assert search(misfits, [*5 * [-90.0], 5.0]) == (1, 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [20, 99])
+def test_contours_among_impossible_ones_are_found(number):
+    """Records whose likeliest places are beside some that would have let the rod go, or where searches end far off."""
+    experiment = experiment_of("shape-free", Rig(load_cell=CELL), rng=2026)
+    record, seed, _ = child(experiment.seed, number).spawn(3)
+    model = experiment.problem_of(simulate(experiment, np.random.default_rng(record)).measured).model
+    walk = contour_start.walk_of(model, spawn(seed, 4)[0], replace(experiment.settings, walkers=120))
+    assert walk.most_steps is None, "something describes the record"
+    start = walk.coordinates.parameters(walk.start.reshape(-1, len(model.names)))[0]
+    assert model.log_probability(start).max() > 1000.0
 
 
 def test_what_a_discrepancy_describes_is_no_misfit():

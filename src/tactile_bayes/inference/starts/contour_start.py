@@ -40,6 +40,8 @@ _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
 _CENTRAL = ndtr(np.array([-1.0, 1.0]))  # probabilities whose quantiles are two standard deviations apart
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
+_SEARCHES = 9  # most by least squares, if nothing before them leads to one
+_DRAWS_NEARBY = 100  # among which a possible one is sought where the centre of a mode is not
 # Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a shape-free
 # contour, which follows what families do not; and the steps that a verdict needs.
 _SMOOTH_FREE, _STEPS_OF_A_VERDICT = 1.4, 25
@@ -92,19 +94,30 @@ class _Start(NamedTuple):
     def _best_whitening(self) -> Whitening:
         """Return coordinates at the best mode to which the first points lead of which one explains the record."""
         found: list[tuple[tuple[bool, float, float], Whitening]] = []
+        alike = False
         for points in self._starting_points():
             for point in points:
                 whitening = whitening_at(self.model, point, self.rng, self.deadline)
-                misfit, centre = mean_square_left(self.model, whitening.centre), whitening.centre[None]
-                rank = misfit < _POOR_MISFIT, float(self.model.log_probability(centre)[0]), -misfit
-                found.append((rank, whitening))
+                misfit, top = mean_square_left(self.model, whitening.centre), self._top_near(whitening)
+                explains = top > -np.inf and misfit < _POOR_MISFIT and not self._is_hopeless(whitening)
+                found.append(((explains, top, -misfit), whitening))
                 best, whitening = max(found, key=lambda one: one[0])
-                possible = [-rank[2] for rank, _ in found if np.isfinite(rank[1])]  # others may touch nothing
-                if self.deadline.has_passed or (are_alike(possible, _ALIKE) and not best[0]):
+                if self.deadline.has_passed:
                     return whitening
-            if best[0]:
+            possible = [-rank[2] for rank, _ in found if rank[1] > -np.inf]  # others may touch nothing
+            were_alike, alike = alike, are_alike(possible, _ALIKE)
+            if best[0] or (were_alike and alike):
                 break
         return whitening
+
+    def _top_near(self, whitening: Whitening) -> float:
+        """Return the log-probability at the centre or, where that is impossible, the largest of draws around it."""
+        log_probability = in_coordinates(self.model.log_probability, whitening)
+        top = float(log_probability(whitening.middle[None])[0])
+        if top > -np.inf:
+            return top
+        draws = self.rng.normal(whitening.middle, _WHITENED_SPREAD, (_DRAWS_NEARBY, whitening.middle.size))
+        return float(log_probability(draws).max())
 
     def _starting_points(self) -> Iterator[Iterable[Floats]]:
         """Yield parameters fitted to Step 2's contacts and the likeliest draws of the prior, or without contacts
@@ -119,7 +132,7 @@ class _Start(NamedTuple):
             yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
             drawn, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
             yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
-        yield (one.point for one in islice(optima_of(model, rng, deadline), 1))
+        yield from ([one.point] for one in islice(optima_of(model, rng, deadline), _SEARCHES))
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
         """Return the start around a centre, in whitening coordinates."""
@@ -141,8 +154,11 @@ class _Start(NamedTuple):
         )
         # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
         log_evidence = float(log_probability(whitening.middle[None])[0])
-        is_hopeless = left_over_noise(self.model, whitening.centre) > _SMOOTH_FREE
-        return Walk(start, whitening, log_evidence, most_steps=_STEPS_OF_A_VERDICT if is_hopeless else None)
+        most_steps = _STEPS_OF_A_VERDICT if self._is_hopeless(whitening) else None
+        return Walk(start, whitening, log_evidence, most_steps=most_steps)
+
+    def _is_hopeless(self, whitening: Whitening) -> bool:
+        return left_over_noise(self.model, whitening.centre) > _SMOOTH_FREE
 
     def scattered(self) -> Walk:
         """Return walkers scattered twice as widely as normal approximations of the modes, which serve as proposals."""
