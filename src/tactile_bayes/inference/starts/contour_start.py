@@ -40,7 +40,8 @@ _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
 _CENTRAL = ndtr(np.array([-1.0, 1.0]))  # probabilities whose quantiles are two standard deviations apart
 _PRIOR_DRAWS = 500  # among which the likeliest is sought
 _LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
-_SEARCHES = 9  # most by least squares, if nothing before them leads to one
+_SEARCHES = 3  # most by least squares, if nothing before them leads to one
+_BETTER = 0.8  # share of the least cost so far below which one of them has ended elsewhere
 _DRAWS_NEARBY = 100  # among which a possible one is sought where the centre of a mode is not
 # Root mean square of a channel's residuals, over the noise between neighbours, that no noise explains, of a shape-free
 # contour, which follows what families do not; and the steps that a verdict needs.
@@ -132,7 +133,14 @@ class _Start(NamedTuple):
             yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
             drawn, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
             yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
-        yield from ([one.point] for one in islice(optima_of(model, rng, deadline), _SEARCHES))
+        costs: list[float] = []
+        for one in islice(optima_of(model, rng, deadline), _SEARCHES):
+            is_better = one.cost < _BETTER * min(costs, default=np.inf)
+            costs.append(one.cost)
+            if are_alike(costs):
+                return
+            if is_better:
+                yield [one.point]
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
         """Return the start around a centre, in whitening coordinates."""
