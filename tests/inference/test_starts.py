@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from helpers.contour_posteriors import CELL
-from tactile_bayes import Rig, scan
+from tactile_bayes import LoadCell, Rig, scan
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
@@ -167,30 +167,26 @@ def test_searches_end_where_a_contour_explains_the_record(search):
     assert search([1.8, 0.9, 0.9], [4.0, 5.0, 9.0], hopeless=[0]) == (1, 2)
 
 
-def test_searches_end_where_they_end_alike_again_and_again(search):
-    """As from the contacts and prior draws, after which a search of another kind has to end there, too."""
-    alike, worse = [14.8, 14.7, 14.7], [-90.0, -91.0, -92.0]
-    assert search([*alike, 14.7, 0.9], [*worse, -93.0, 5.0]) == (0, 4)
-    assert search([*alike, 0.9, 0.9], [*worse, 5.0, 5.0]) == (3, 4)
-
-
-def test_places_that_touch_nothing_do_not_show_that_nothing_describes_a_record(search):
-    misfits, impossible = [14.8, 14.7, 14.7, 14.7, 14.7, 0.9], [-90.0, *4 * [-np.inf], 5.0]
-    assert search(misfits, impossible) == (5, 6)
-    assert search(misfits, [*5 * [-90.0], 5.0]) == (1, 4)
+def test_searches_end_where_they_end_alike(search):
+    misfits, impossible = [3.8, 3.7, 3.7, 3.7, 0.9], [-90.0, -np.inf, -np.inf, -np.inf, 5.0]
+    assert search(misfits, [-90.0, -91.0, -92.0, -93.0, 5.0]) == (0, 3)
+    assert search(misfits, impossible) == (4, 5), "places that touch nothing are alike in any record"
+    clipped = [14.8, 14.7, 14.7, 14.7, 0.9]
+    assert search(clipped, [-90.0, -91.0, -92.0, -93.0, 5.0]) == (4, 5), "as are those that are far off"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [20, 99])
-def test_contours_among_impossible_ones_are_found(number):
+@pytest.mark.parametrize(("number", "noise"), [(20, 1.0), (99, 1.0), (8, 3.0)])
+def test_contours_among_impossible_ones_are_found(number, noise):
     """Records whose likeliest places are beside some that would have let the rod go, or where searches end far off."""
-    experiment = experiment_of("shape-free", Rig(load_cell=CELL), rng=2026)
+    cell = LoadCell(force_noise=noise * CELL.force_noise, moment_noise=noise * CELL.moment_noise)
+    experiment = experiment_of("shape-free", Rig(load_cell=cell), rng=2026)
     record, seed, _ = child(experiment.seed, number).spawn(3)
     model = experiment.problem_of(simulate(experiment, np.random.default_rng(record)).measured).model
     walk = contour_start.walk_of(model, spawn(seed, 4)[0], replace(experiment.settings, walkers=120))
     assert walk.most_steps is None, "something describes the record"
     start = walk.coordinates.parameters(walk.start.reshape(-1, len(model.names)))[0]
-    assert model.log_probability(start).max() > 1000.0
+    assert model.log_probability(start).max() > 800.0
 
 
 def test_what_a_discrepancy_describes_is_no_misfit():

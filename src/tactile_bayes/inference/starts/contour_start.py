@@ -48,6 +48,7 @@ _DRAWS_NEARBY = 100  # among which a possible one is sought where the centre of 
 _SMOOTH_FREE, _STEPS_OF_A_VERDICT = 1.4, 25
 _POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
 _ALIKE = 1.05  # ratio of such misfits below which they are alike
+_CLIPPED = 12.5  # misfit of any place where half the residuals are clipped
 
 
 class Walk(NamedTuple):
@@ -95,7 +96,6 @@ class _Start(NamedTuple):
     def _best_whitening(self) -> Whitening:
         """Return coordinates at the best mode to which the first points lead of which one explains the record."""
         found: list[tuple[tuple[bool, float, float], Whitening]] = []
-        alike = False
         for points in self._starting_points():
             for point in points:
                 whitening = whitening_at(self.model, point, self.rng, self.deadline)
@@ -103,11 +103,11 @@ class _Start(NamedTuple):
                 explains = top > -np.inf and misfit < _POOR_MISFIT and not self._is_hopeless(whitening)
                 found.append(((explains, top, -misfit), whitening))
                 best, whitening = max(found, key=lambda one: one[0])
-                if self.deadline.has_passed:
+                # Others may touch nothing, or have all the same misfit since most samples are clipped.
+                telling = [-rank[2] for rank, _ in found if rank[1] > -np.inf and -rank[2] < _CLIPPED]
+                if self.deadline.has_passed or (are_alike(telling, _ALIKE) and not best[0]):
                     return whitening
-            possible = [-rank[2] for rank, _ in found if rank[1] > -np.inf]  # others may touch nothing
-            were_alike, alike = alike, are_alike(possible, _ALIKE)
-            if best[0] or (were_alike and alike):
+            if best[0]:
                 break
         return whitening
 
