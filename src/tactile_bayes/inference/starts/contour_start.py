@@ -122,7 +122,7 @@ class _Start(NamedTuple):
 
     def _starting_points(self) -> Iterator[Iterable[Floats]]:
         """Yield parameters fitted to Step 2's contacts and the likeliest draws of the prior, or without contacts
-        those of a circle, and at last those of a search."""
+        those of a circle, and at last those of searches."""
         model, rng, deadline = self.model, self.rng, self.deadline
         by_contacts = contact_fit(model)
         if by_contacts is None:
@@ -133,13 +133,10 @@ class _Start(NamedTuple):
             yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
             drawn, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
             yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
-        costs: list[float] = []
+        least = np.inf
         for one in islice(optima_of(model, rng, deadline), _SEARCHES):
-            is_better = one.cost < _BETTER * min(costs, default=np.inf)
-            costs.append(one.cost)
-            if are_alike(costs):
-                return
-            if is_better:
+            if one.cost < _BETTER * least:
+                least = one.cost
                 yield [one.point]
 
     def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
