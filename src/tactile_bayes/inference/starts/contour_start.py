@@ -96,6 +96,7 @@ class _Start(NamedTuple):
     def _best_whitening(self) -> Whitening:
         """Return coordinates at the best mode to which the first points lead of which one explains the record."""
         found: list[tuple[tuple[bool, float, float], Whitening]] = []
+        telling: list[float] = []  # misfits, but for what touches nothing, or clips most residuals
         for points in self._starting_points():
             for point in points:
                 whitening = whitening_at(self.model, point, self.rng, self.deadline)
@@ -103,8 +104,8 @@ class _Start(NamedTuple):
                 explains = top > -np.inf and misfit < _POOR_MISFIT and not self._is_hopeless(whitening)
                 found.append(((explains, top, -misfit), whitening))
                 best, whitening = max(found, key=lambda one: one[0])
-                # Others may touch nothing, or have all the same misfit since most samples are clipped.
-                telling = [-rank[2] for rank, _ in found if rank[1] > -np.inf and -rank[2] < _CLIPPED]
+                if top > -np.inf and misfit < _CLIPPED:  # else all are alike
+                    telling.append(misfit)
                 if self.deadline.has_passed or (are_alike(telling, _ALIKE) and not best[0]):
                     return whitening
             if best[0]:
