@@ -69,6 +69,7 @@ class Draws:
 
 _PER_WALKER = 3  # effective draws, at least: the half that is left out exceeds as many autocorrelation times
 _ADAPTED = 100  # steps up to which coordinates are fitted to those kept at each diagnosis
+_TELLING = 25  # steps from which a walker that made none is stuck: some move rarely, also by chance
 _CONVERGED = "converged"
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
 _OUT_OF_TIME = "not converged, the time allowed ran out"
@@ -234,7 +235,7 @@ class _Run:
         of_walkers = f"of {chains * walkers} walkers"
         if lost:
             message += f"; {lost} {of_walkers} were where the posterior is improbable: do not use the results"
-        if stuck > by_chance + 3.0 * np.sqrt(by_chance):
+        if stuck > by_chance + 3.0 * np.sqrt(by_chance) and moved.shape[1] >= _TELLING:
             message += f"; {stuck} {of_walkers} did not move in the steps kept: look at their positions"
         return Draws(
             samples=walker_major(half.samples),
