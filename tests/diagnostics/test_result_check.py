@@ -80,21 +80,42 @@ def test_what_has_not_converged_is_said_even_where_there_is_nothing_to_compare_w
     assert kinds(tb.check(tree)) == ["not converged"]
 
 
-@pytest.mark.parametrize(
-    ("factor", "scatter", "kind"),
-    [(4.0, 4.0, "larger noise"), (0.25, 0.25, "larger noise"), (4.0, 1.0, "misfit as noise")],
-)
-def test_noise_that_is_not_as_stated(factor, scatter, kind):
+def with_noise(factor, scatter):
+    """A result of so many times the noise as predicted, and of so many as measured."""
     tree = changed(predicted(), "posterior", noise_scale=np.full((4, 250), factor))
     predictive = tree["posterior_predictive"].to_dataset()
     for name in CHANNELS:
         predictive[name] = ideal(name) + factor * (predictive[name] - ideal(name))
     tree["posterior_predictive"] = xr.DataTree(predictive)
-    found = tb.check(
-        with_readings(tree, **{name: ideal(name) + scatter * (v - ideal(name)) for name, v in readings(tree).items()})
-    )
+    return with_readings(tree, **{n: ideal(n) + scatter * (v - ideal(n)) for n, v in readings(tree).items()})
+
+
+@pytest.mark.parametrize(
+    ("factor", "scatter", "kind"),
+    [(4.0, 4.0, "larger noise"), (0.25, 0.25, "larger noise"), (4.0, 1.0, "misfit as noise")],
+)
+def test_noise_that_is_not_as_stated(factor, scatter, kind):
+    found = tb.check(with_noise(factor, scatter))
     assert kinds(found) == [kind]
     assert float(found.messages[0].details["factor"]) == factor
+
+
+def test_misfit_that_wide_predictions_hide_is_the_first_thing_said_with_its_cause():
+    tree = with_noise(4.0, 1.0)
+    tree.attrs |= {"converged": 0, "message": "not converged, the steps allowed ran out"}
+    columns = {"log_evidence": 50.0, "describes": 1, "sought": 1, "remedy": 'friction = "default"'}
+    causes = xr.Dataset({name: ("cause", [value]) for name, value in columns.items()}, {"cause": ["friction"]})
+    tree["causes"] = xr.DataTree(causes)
+    found = tb.check(tree)
+    assert kinds(found)[:2] == ["misfit as noise", "not converged"]
+    assert 'friction, which describes it: infer with friction = "default"' in found.messages[0]
+
+
+def test_a_zero_that_is_inferred_is_not_called_a_forgotten_tare_where_a_wrong_model_moves_it():
+    tree = predicted()
+    off = with_readings(tree, force_y=readings(tree)["force_y"] + 0.3)
+    off.attrs |= {"nuisances": '["force_y_bias"]'}
+    assert kinds(tb.check(off))[0] == "not described"
 
 
 def test_loads_that_contradict_one_another_unless_noise_does_it():

@@ -100,7 +100,7 @@ TEXTS: Mapping[str, str] = {
     ),
     "misfit as noise": (
         "The noise is {factor} times what the load cell states, but neighbouring samples scatter {alike}: the rest is "
-        "misfit, not noise."
+        "misfit, not noise.{causes}"
     ),
     "beyond the prior": (
         "The record contradicts the prior: {values}. Check the stated rod and drive angle, {subtract}or give a wider "

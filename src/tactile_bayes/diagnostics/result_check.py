@@ -58,6 +58,7 @@ _SMALL = 0.05  # probability of a record below which a reader may take agreement
 _NARROWER = 0.9  # share of the band's half width below which it is said to be narrower
 # Columns whose zero a parameter is.
 _COLUMN_OF_ZERO = dict(zip((*_ZEROS, "drive_angle_offset"), (*CHANNELS, "drive_angle"), strict=True))
+_ZERO_OF_COLUMN = dict(zip(CHANNELS, _ZEROS, strict=True))
 _USUAL = 0.95  # probability of the band if a posterior does not state one
 _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
@@ -213,16 +214,20 @@ def check(
     residuals = residuals_of(posterior)  # after the check has released its own: those of a long record are large
     unloaded = quiet_zero_load(result.record)
     against = [*unit_and_sign_findings(result.record), *doubtful_sides(attrs)]
-    against += [*_off_zero(result.record, unloaded, residuals), *_moved_zero(result, unloaded)]
-    if predictive is not None and not predictive.attrs["passed"] and not not_checked:
+    against += [*_off_zero(result, unloaded, residuals), *_moved_zero(result, unloaded)]
+    noisier = 1.0 if predictive is None else _neighbours_over_stated(result.cell, predictive)
+    fails = predictive is not None and not predictive.attrs["passed"] and not not_checked
+    noise = _noise(result, noisier, "" if fails else likely_causes(posterior))
+    if predictive is not None and fails:
         against.append(_not_described(result, predictive))
+    elif noise and noise[0].kind == "misfit as noise":  # of draws that lie far apart
+        against.append(noise.pop())
     if trust is not None and conclusion == NOT:
         against.append(Finding("not reliable", summary=trust.attrs["summary"]))
     if not attrs["converged"]:
         against.append(Finding("not converged", message=attrs["message"].replace("not converged", "NOT CONVERGED", 1)))
-    noisier = 1.0 if predictive is None else _neighbours_over_stated(result.cell, predictive)
     beyond = _beyond_prior(result)
-    against += [*_noise(result, noisier), *_contradictions(result, contacts, noisier)]
+    against += [*noise, *_contradictions(result, contacts, noisier)]
     against += [*_beyond_findings(beyond, result), *_cut_off(result)]
     if predictive is not None:
         against += _smooth(predictive)
@@ -305,10 +310,12 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[Finding]:
     return [Finding("doubtful side", taken=taken, sure=sure)]
 
 
-def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[Finding]:
-    """Report channels whose unloaded readings differ from what the posterior expects."""
-    off, entries = {}, {}
+def _off_zero(result: _Result, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[Finding]:
+    """Report channels whose unloaded readings differ from what the posterior expects, though no zero is inferred."""
+    record, off, entries = result.record, {}, {}
     for name, of_channel in residuals.items():
+        if _ZERO_OF_COLUMN[name] in result.inferred:
+            continue  # a wrong model moves it
         unloaded = found.unloaded.values & ~of_channel.loaded
         uncertainty = float(found.bias_uncertainty.sel(channel=name))
         if np.count_nonzero(unloaded) < 3 or not math.isfinite(uncertainty):
@@ -376,7 +383,7 @@ def _neighbours_over_stated(cell: LoadCell, check: xr.Dataset) -> float:
     return float(np.median(ratios)) if ratios else 1.0
 
 
-def _noise(result: _Result, noisier: float) -> list[Finding]:
+def _noise(result: _Result, noisier: float, causes: str) -> list[Finding]:
     if "noise_scale" not in result.draws:
         return []
     factor = float(result.draws["noise_scale"].median())
@@ -384,7 +391,7 @@ def _noise(result: _Result, noisier: float) -> list[Finding]:
         return []
     if noisier < 0.5 * factor and factor > NOISE_FACTOR:
         alike = f"{noisier:.2g} times as much as stated" if abs(math.log(noisier)) > 0.2 else "as stated"
-        return [Finding("misfit as noise", factor=f"{factor:.3g}", alike=alike)]
+        return [Finding("misfit as noise", factor=f"{factor:.3g}", alike=alike, causes=f" {causes}".rstrip())]
     return [Finding("larger noise", factor=f"{factor:.3g}")]
 
 

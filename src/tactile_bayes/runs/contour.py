@@ -47,6 +47,7 @@ from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 _POSTERIOR = "posterior.nc"
 _LONG = 20.0  # time of search and sampling [s] from which their draws are kept before anything else is computed
+_MISFIT = {"not described", "misfit as noise"}  # kinds of findings of which the causes are sought
 _MOST_PARAMETERS = 5  # largest number of parameters in a figure, unless a contour has more
 
 Follow = Callable[[str], object]
@@ -192,7 +193,7 @@ def complete(
             edges = gap_if_any(result, probability)
         with folder.attempt("check", "summary.txt"):
             checked = check(result, contacts)
-        if checked is not None and any(finding.kind == "not described" for finding in checked.messages):
+        if checked is not None and any(finding.kind in _MISFIT for finding in checked.messages):
             follow("what may be wrong, a second or two each")
             with folder.attempt("causes", "causes"):
                 result["causes"] = xr.DataTree(causes(result))
