@@ -45,6 +45,15 @@ def test_what_is_wrong_is_named_first_and_describes_the_record(cause, size, seed
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("cause", "size"), [("friction", 0.2), ("lever_y", 0.05), ("moment_lag", 1.5), ("lag", 1.5)])
+def test_a_number_that_is_known_and_wrong_is_a_cause(cause, size):
+    found = causes(inferred(Rig(load_cell=CELL, unknown={"noise_scale": 1.0}), unknown={cause: size}))
+    assert found.cause.values[0] == cause
+    assert found.describes.values[0] == 1
+    assert f'{cause} = "default"' in str(found.remedy.values[0])
+
+
+@pytest.mark.slow
 def test_cut_off_readings_are_a_cause_of_which_the_range_is_the_cure():
     record = swept(SHAPE, step=0.03)
     largest = 0.6 * float(np.abs(record.force_y).max())

@@ -118,6 +118,7 @@ def alternatives_of(experiment: Experiment, seen: Inspection | None = None) -> l
             found.append(Alternative(f"{group} as stated", "fixed", _as_stated(experiment, members)))
         elif not any(belongs(name, group) for name in experiment.unknowns.known):
             found += _added(experiment, group)
+    found += [each for name in experiment.unknowns.known for each in _added(experiment, name)]
     found += _limited(experiment, seen or inspect_record(experiment.record, experiment.rig))
     families = [name for name in SHAPES if name != experiment.own_family.name]
     return [*found, *(Alternative(f"family {name}", "family", replace(experiment, family=name)) for name in families)]

@@ -95,8 +95,8 @@ _SHAPE_FREE, _FLAT_SIDED = "family shape-free", "family flat-sided"
 def causes(posterior: xr.DataTree) -> xr.Dataset:
     """Try what may be wrong with the rig or the family of a posterior that does not describe its record.
 
-    Each unknown of the rig that is not inferred is added, a spot that is flatter or more bent is put anywhere along the
-    contour, and each other family is taken. First all are judged by score tests, the derivatives of the loads at the
+    Each parameter of the rig that is not inferred, also where it is known, is inferred, a spot that is flatter or more
+    bent is put anywhere along the contour, and each other family is taken. First all are judged by score tests, the derivatives of the loads at the
     most probable parameters, in milliseconds; then the most probable parameters with the likeliest are sought, less
     than a second each, until one describes the record, and with those that are nearly as likely. If none does, the
     four likeliest are sought again, from more places. This takes 45 s at most; nothing is sampled.
@@ -201,7 +201,8 @@ class _Tests:
         self.missed: list[str] = []  # names of those that were not sought for lack of time
         self.known = self.likely = -np.inf  # log-evidence of what describes the record, and that to first order
         self.model = contour_problem(experiment).model
-        stated = stated_values(rod_of(experiment.record), stated_cell(experiment))
+        sheets = stated_values(rod_of(experiment.record), stated_cell(experiment))
+        stated = {**sheets, **self.model.unknowns.known}
         of_contour = {name: found[name] for name in self.model.family.parameters}
         # A wrong model may have a far-off rig; a shape-free contour, which follows most, is where the search left it.
         most = 1 if isinstance(self.model.family, ShapeFreeFamily) else None

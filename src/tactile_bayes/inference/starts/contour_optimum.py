@@ -36,7 +36,7 @@ _PRIOR_DRAWS = 1000
 _PRIOR_QUANTILES = 25
 _STEP_OF_ADDED = 0.2  # of the differences by a parameter that is added, in prior standard deviations
 _FARTHEST = 2.0  # longest step to first order, in prior standard deviations of a parameter
-_SHARES = np.array([1.0, 0.5, 0.25, 0.1, 0.0])  # of that step, of which the best is taken
+_SHARES = np.array([1.0, 0.5, 0.25, 0.1])  # of it, of which the best is taken; from none a search may not leave
 _CANDIDATES = 24  # most prior draws from which searches begin, the likeliest first: from too far away they stop early
 _SMOOTH_DRAWS, _SMOOTH_STARTS = 300, 6  # of the prior, and of the likeliest of them, for contours without roughness
 _EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
@@ -175,13 +175,13 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
     precision = (slopes.T * weight) @ slopes + np.eye(place.size)
     score = -(slopes.T * weight) @ residuals - (place - search.middle / search.spread)
     own = [i for i, name in enumerate(names) if name not in loose]
-    vanishing, found = set(np.array(names)[model.may_vanish[: len(names)]]), []
+    at_zero, found = model.may_vanish[: len(names)] & (place <= 0.0), []
     for group in added:
         which = [names.index(name) for name in group]
         while True:
             both = own + which
             step = np.linalg.solve(precision[np.ix_(both, both)], score[both])
-            wrong = [i for i, move in zip(which, step[len(own) :], strict=True) if names[i] in vanishing and move < 0.0]
+            wrong = [i for i, move in zip(which, step[len(own) :], strict=True) if at_zero[i] and move < 0.0]
             if not wrong:
                 break
             which = [i for i in which if i not in wrong]
@@ -372,7 +372,8 @@ class _Search:
             return ""
         favoured, ends, names = self.points(found.beyond[None])[0], self.model.ends, self.model.forward_parameters
         low, high = ends.low[: favoured.size], ends.high[: favoured.size]
-        off = np.flatnonzero((favoured <= low) | (favoured >= high))
+        widens = ~(self.model.may_vanish[: favoured.size] & (low <= 0.0))  # negative friction is no matter of a prior
+        off = np.flatnonzero((favoured <= low) & widens | (favoured >= high))
         return ", ".join(f"{names[i]} = {favoured[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off)
 
 
