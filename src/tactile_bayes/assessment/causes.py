@@ -96,10 +96,11 @@ def causes(posterior: xr.DataTree) -> xr.Dataset:
     """Try what may be wrong with the rig or the family of a posterior that does not describe its record.
 
     Each parameter of the rig that is not inferred, also where it is known, is inferred, a spot that is flatter or more
-    bent is put anywhere along the contour, and each other family is taken. First all are judged by score tests, the derivatives of the loads at the
-    most probable parameters, in milliseconds; then the most probable parameters with the likeliest are sought, less
-    than a second each, until one describes the record, and with those that are nearly as likely. If none does, the
-    four likeliest are sought again, from more places. This takes 45 s at most; nothing is sampled.
+    bent is put anywhere along the contour, and each other family is taken. First all are judged by score tests, the
+    derivatives of the loads at the most probable parameters, in milliseconds; then the most probable parameters with
+    the likeliest are sought, less than a second each, until one describes the record, and with those that are nearly as
+    likely. If none does, the four likeliest are sought again, from more places. This takes 45 s at most; nothing is
+    sampled.
 
     Parameters
     ----------
