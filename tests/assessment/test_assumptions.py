@@ -40,6 +40,9 @@ def test_each_unknown_is_added_or_fixed_and_each_other_family_tried():
     assert "base inferred" in names_of(bases=TWO_PIVOTS)
     assert "friction inferred" in names_of()
     assert "friction inferred" in names_of(rig=Rig(unknown=only(friction=0.2)))  # what is known may be wrong
+    said = names_of(rig=Rig(unknown=only("bias", lever=0.1, force_y_bias=0.2)))
+    assert {"lever inferred", "bias as stated", "force_y_bias inferred"} < set(said)
+    assert not {"lever_x inferred", "bias inferred", "moment_bias inferred"} & set(said)
     # Gains take the place of the rigidity, which has the same effect.
     gains = names_of("rigidity_scale")["gain inferred for rigidity_scale"]
     assert unknown_of(gains) == ("moment_gain", "force_x_gain", "force_y_gain")

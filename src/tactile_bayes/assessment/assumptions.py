@@ -111,14 +111,15 @@ def band_by_assumption(
 
 def alternatives_of(experiment: Experiment, seen: Inspection | None = None) -> list[Alternative]:
     """Return the experiments that differ in one assumption, except those that the record cannot identify."""
-    names, found = set(experiment.unknowns.names), []
+    names, known, found = set(experiment.unknowns.names), experiment.unknowns.known, []
     for group in _UNKNOWNS:
         members = {name for name in names if belongs(name, group)}
         if members:
             found.append(Alternative(f"{group} as stated", "fixed", _as_stated(experiment, members)))
-        elif not any(belongs(name, group) for name in experiment.unknowns.known):
+        elif not any(belongs(name, group) for name in known):
             found += _added(experiment, group)
-    found += [each for name in experiment.unknowns.known for each in _added(experiment, name)]
+    said = [name for name in experiment.rig.entries if any(belongs(each, name) for each in known)]
+    found += [each for name in said for each in _added(experiment, name)]
     found += _limited(experiment, seen or inspect_record(experiment.record, experiment.rig))
     families = [name for name in SHAPES if name != experiment.own_family.name]
     return [*found, *(Alternative(f"family {name}", "family", replace(experiment, family=name)) for name in families)]
