@@ -177,6 +177,7 @@ class _Cause:
     log_evidence: float  # above that of the model as it is
     model: ContourModel
     starts: list[dict[str, float]]
+    moved: dict[str, float] | None = None  # a start beyond an edge, at which a search from the first may stay
     is_shape: bool = False
     # Cost of the model as it is by the samples and events that one with a memory takes, less that by its own.
     more: float = 0.0
@@ -221,21 +222,21 @@ class _Tests:
         causes = []
         for each in alternatives:
             with suppress(TactileBayesError):  # what cannot be tried is no cause
-                model, starts, gain = contour_problem(each.experiment).model, self.starts, np.inf
+                model, starts, gain, moved = contour_problem(each.experiment).model, self.starts, np.inf, None
                 added = [name for name in model.forward_parameters if name not in self.model.forward_parameters]
                 if added and each.kind == "added":
                     start = dict(starts[0])
                     for name in set(self.model.forward_parameters) - set(model.forward_parameters):
                         start |= dict.fromkeys(added, start[name])  # gains in place of the scale of rigidity
                     (step,) = first_order(model, start, [added])
-                    gain, starts = step.log_evidence, [step.start, *starts[1:]]
+                    gain, starts, moved = step.log_evidence, [step.start, *starts[1:]], step.moved
                 name, is_shape = each.name.replace(" inferred", ""), each.kind == "family"
                 more = 0.0
                 if model.unknowns.memory and not self.model.unknowns.memory:
                     if model.likelihood.measured.shape == self.model.likelihood.measured.shape:
                         model.deviation = self.model.deviation
                     more = cost_of_residuals(model, self.starts[0]) - cost_of_residuals(self.model, self.starts[0])
-                causes.append(_Cause(name, _remedy(each, self.experiment), gain, model, starts, is_shape, more))
+                causes.append(_Cause(name, _remedy(each, self.experiment), gain, model, starts, moved, is_shape, more))
         return causes
 
     def any_shape(self) -> tuple[list[_Cause], _Cause | None]:
@@ -296,6 +297,9 @@ class _Tests:
         """Return a cause with its optimum, from the first so many places or from all; as it is if it has none."""
         with suppress(TactileBayesError):
             found = optimum_beside(cause.model, cause.starts, self.deadline, most)
+            if most and cause.moved and found.log_evidence + cause.more <= self.own.log_evidence:
+                again = optimum_beside(cause.model, [cause.moved], self.deadline, most)
+                found = max(found, again, key=lambda one: one.log_evidence)
             gain = found.log_evidence - self.own.log_evidence + cause.more
             if found.fits:
                 self.known, self.likely = max(self.known, gain), max(self.likely, cause.log_evidence)

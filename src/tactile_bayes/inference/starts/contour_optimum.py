@@ -36,7 +36,7 @@ _PRIOR_DRAWS = 1000
 _PRIOR_QUANTILES = 25
 _STEP_OF_ADDED = 0.2  # of the differences by a parameter that is added, in prior standard deviations
 _FARTHEST = 2.0  # longest step to first order, in prior standard deviations of a parameter
-_SHARES = np.array([1.0, 0.5, 0.25, 0.1])  # of it, of which the best is taken; from none a search may not leave
+_SHARES = np.array([1.0, 0.5, 0.25, 0.1, 0.0])  # of that step, of which the best is taken
 _CANDIDATES = 24  # most prior draws from which searches begin, the likeliest first: from too far away they stop early
 _SMOOTH_DRAWS, _SMOOTH_STARTS = 300, 6  # of the prior, and of the likeliest of them, for contours without roughness
 _EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
@@ -149,7 +149,8 @@ class FirstOrder(NamedTuple):
     """What a parameter that is added explains of a record, to first order, all others fitted again."""
 
     log_evidence: float  # above that without the parameter, for the coarse noise
-    start: dict[str, float]  # parameters after the step, by name
+    start: dict[str, float]  # parameters after the best part of the step, by name
+    moved: dict[str, float] | None  # if that is none of it, those after the best of the others: an edge may be near
 
 
 def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence[Sequence[str]]) -> list[FirstOrder]:
@@ -190,8 +191,9 @@ def first_order(model: ContourModel, start: Mapping[str, float], added: Sequence
         of_both, of_own = (np.linalg.slogdet(precision[np.ix_(some, some)]).logabsdet for some in (both, own))
         moved = np.tile(place, (_SHARES.size, 1))
         moved[:, both] += _SHARES[:, None] * np.clip(step, -_FARTHEST, _FARTHEST)
-        point = search.points(moved * search.spread)[np.argmin(search.costs(moved * search.spread))]
-        found.append(FirstOrder(float(gain - 0.5 * (of_both - of_own)), dict(zip(names, point.tolist(), strict=True))))
+        costs, points = search.costs(moved * search.spread), search.points(moved * search.spread).tolist()
+        best, other = (dict(zip(names, points[np.argmin(some)], strict=True)) for some in (costs, costs[:-1]))
+        found.append(FirstOrder(float(gain - 0.5 * (of_both - of_own)), best, other if best != other else None))
     return found
 
 
