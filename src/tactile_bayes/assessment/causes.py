@@ -83,7 +83,7 @@ COLUMNS_OF_CAUSES = ("log_evidence", "describes", "sought", "remedy")
 _SECONDS = 45.0  # time limit of all searches [s], each of which takes about one, and shape-free four
 # Share of the log-evidence to first order of what describes the record below which nothing else is sought, and of what
 # does not, below which that is a surprise; and number of the likeliest causes that are then sought from all places.
-_LIKELY, _CLOSELY = 0.3, 4
+_LIKELY, _CLOSELY = 0.3, 5
 _LEAST = 0.03  # share of the log-evidence of what describes the record, below which a shape is not looked at closely
 # Least share of what any shape explains that one spot explains, to be named in its place; and of the log-evidence of
 # what describes the record, for a shape that does not.
@@ -99,7 +99,7 @@ def causes(posterior: xr.DataTree) -> xr.Dataset:
     bent is put anywhere along the contour, and each other family is taken. First all are judged by score tests, the
     derivatives of the loads at the most probable parameters, in milliseconds; then the most probable parameters with
     the likeliest are sought, less than a second each, until one describes the record, and with those that are nearly as
-    likely. If none does, the four likeliest are sought again, from more places. This takes 45 s at most; nothing is
+    likely. If none does, the five likeliest are sought again, from more places. This takes 45 s at most; nothing is
     sampled.
 
     Parameters
