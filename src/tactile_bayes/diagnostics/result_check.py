@@ -157,12 +157,13 @@ def check(
     Returns
     -------
     Check
-        Its messages report, in this order: loads that such a rod cannot have; a zero that is off, or that moved; a
-        record unlike the predictions; reasons not to rely on the band (`trust`); ensembles that have not converged;
-        noise twice as large as stated, or half; loads of a sample that contradict one another; unknowns of the rig that
-        are nearly impossible under their prior; parameters that are cut off where the model has no path of the rod;
-        smooth residuals; a check that was not made. The last, which are no faults, say that the prior sets the gap,
-        which parameters the record hardly determines, and, where all is well, what sets the width of the band.
+        Its messages report, in this order: loads that such a rod cannot have; a zero that is off and not inferred, or
+        that moved; a record unlike the predictions, or misfit in its noise that these hide; reasons not to rely on the
+        band (`trust`); ensembles that have not converged; noise twice as large as stated, or half; loads of a sample
+        that contradict one another; unknowns of the rig that are nearly impossible under their prior; parameters that
+        are cut off where the model has no path of the rod; smooth residuals; a check that was not made. The last, which
+        are no faults, say that the prior sets the gap, which parameters the record hardly determines, and, where all is
+        well, what sets the width of the band.
 
     Raises
     ------
