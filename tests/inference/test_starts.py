@@ -176,8 +176,8 @@ def test_searches_end_where_they_end_alike(search):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "noise"), [(20, 1.0), (99, 1.0), (8, 3.0)])
-def test_contours_among_impossible_ones_are_found(number, noise):
+@pytest.mark.parametrize(("number", "noise", "least"), [(20, 1.0, 1000.0), (99, 1.0, 1000.0), (8, 3.0, 800.0)])
+def test_contours_among_impossible_ones_are_found(number, noise, least):
     """Records whose likeliest places are beside some that would have let the rod go, or where searches end far off."""
     cell = LoadCell(force_noise=noise * CELL.force_noise, moment_noise=noise * CELL.moment_noise)
     experiment = experiment_of("shape-free", Rig(load_cell=cell), rng=2026)
@@ -186,7 +186,7 @@ def test_contours_among_impossible_ones_are_found(number, noise):
     walk = contour_start.walk_of(model, spawn(seed, 4)[0], replace(experiment.settings, walkers=120))
     assert walk.most_steps is None, "something describes the record"
     start = walk.coordinates.parameters(walk.start.reshape(-1, len(model.names)))[0]
-    assert model.log_probability(start).max() > 800.0
+    assert model.log_probability(start).max() > least
 
 
 def test_what_a_discrepancy_describes_is_no_misfit():

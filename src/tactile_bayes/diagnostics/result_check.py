@@ -58,7 +58,6 @@ _SMALL = 0.05  # probability of a record below which a reader may take agreement
 _NARROWER = 0.9  # share of the band's half width below which it is said to be narrower
 # Columns whose zero a parameter is.
 _COLUMN_OF_ZERO = dict(zip((*_ZEROS, "drive_angle_offset"), (*CHANNELS, "drive_angle"), strict=True))
-_ZERO_OF_COLUMN = dict(zip(CHANNELS, _ZEROS, strict=True))
 _USUAL = 0.95  # probability of the band if a posterior does not state one
 _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
@@ -217,10 +216,10 @@ def check(
     against = [*unit_and_sign_findings(result.record), *doubtful_sides(attrs)]
     against += [*_off_zero(result, unloaded, residuals), *_moved_zero(result, unloaded)]
     noisier = 1.0 if predictive is None else _neighbours_over_stated(result.cell, predictive)
-    fails = predictive is not None and not predictive.attrs["passed"] and not not_checked
-    noise = _noise(result, noisier, "" if fails else likely_causes(posterior))
-    if predictive is not None and fails:
-        against.append(_not_described(result, predictive))
+    failed = None if predictive is None or predictive.attrs["passed"] or not_checked else predictive
+    noise = _noise(result, noisier, likely_causes(posterior) if failed is None else "")
+    if failed is not None:
+        against.append(_not_described(result, failed))
     elif noise and noise[0].kind == "misfit as noise":  # of draws that lie far apart
         against.append(noise.pop())
     if trust is not None and conclusion == NOT:
@@ -314,8 +313,9 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[Finding]:
 def _off_zero(result: _Result, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[Finding]:
     """Report channels whose unloaded readings differ from what the posterior expects, though no zero is inferred."""
     record, off, entries = result.record, {}, {}
+    inferred = {column for zero, column in _COLUMN_OF_ZERO.items() if zero in result.inferred}
     for name, of_channel in residuals.items():
-        if _ZERO_OF_COLUMN[name] in result.inferred:
+        if name in inferred:
             continue  # a wrong model moves it
         unloaded = found.unloaded.values & ~of_channel.loaded
         uncertainty = float(found.bias_uncertainty.sel(channel=name))
